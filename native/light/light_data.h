@@ -1,0 +1,35 @@
+// Lights as plain data; what they emit and how they are sampled is in light.h.
+#pragma once
+
+#include "core/rgb.h"
+#include "core/transform.h"
+
+namespace vlp {
+
+enum class LightKind : uint8_t { point, spot, sun, area, triangle, sphere, environment };
+
+struct Light {
+    LightKind kind = LightKind::point;
+    bool ellipse = false;         // area
+    uint32_t visibility = 0;      // lamps: which rays see the shape
+    uint32_t instance = k_none;   // triangle and sphere: the surface that emits
+    uint32_t primitive = 0;
+    Rgb radiance;                 // point and spot of radius 0: intensity (W/sr); sun of angle 0: irradiance (W/m²)
+    Vec3 position;                // point, spot, area: centre; sphere: centre in world space; triangle: first vertex
+    Vec3 axis_u, axis_v;          // area: half edges; triangle: the two edges from the first vertex
+    Vec3 normal;                  // area, spot, sun: the direction of shining; triangle: unit geometric normal
+    float radius = 0;             // point, spot, sphere; sun: sine of half the disc's angle
+    float area = 0;               // of the emitting shape, one side (m²)
+    float cos_outer = -1;         // spot: cosine of half its size; sun: cosine of half the disc's angle
+    float blend = 0;              // spot
+    float spread = 0;             // area: see light/area.h
+    float spread_normalization = 1;
+};
+
+// Lamps with a shape (radius or area), found by rays but not blocking them.
+struct LampView {
+    const uint32_t* lights = nullptr;  // indices of such lamps
+    uint32_t count = 0;
+};
+
+}  // namespace vlp
