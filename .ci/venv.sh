@@ -16,4 +16,4 @@ if [ ! -x "$dir/bin/python" ]; then
   wanted=${versions%% *}
   [ "$version" = "$wanted" ] || echo "vlp-bpt: Python $wanted not found: using $version, with Blender $([ "$version" = 3.11 ] && echo 4.5 || echo 'as PyPI has it') as the bpy module" >&2
 fi
-"$uv" pip install --quiet --python "$dir" "${@/#/--group=}"
+[ $# -eq 0 ] || "$uv" pip install --quiet --python "$dir" "${@/#/--group=}"

@@ -13,4 +13,4 @@ inline bool cpu_supports_avx2() {
 #endif
 }
 
-} // namespace vlp
+}  // namespace vlp

@@ -21,6 +21,8 @@ def test_variant_loads(isa: str) -> None:
 
 def test_unknown_variant_is_named() -> None:
     env = os.environ | {"VLP_BPT_ISA": "sse9"}
-    result = subprocess.run([sys.executable, "-c", "import vlp_bpt"], env=env, capture_output=True, text=True, check=False)
+    result = subprocess.run(
+        [sys.executable, "-c", "import vlp_bpt"], env=env, capture_output=True, text=True, check=False
+    )
     assert result.returncode != 0
     assert "VLP_BPT_ISA='sse9'" in result.stderr
