@@ -26,6 +26,12 @@ PYTEST_ARGS ?=
 CXX_FILES = $(shell find native tests/native -name '*.cpp' -o -name '*.h' -o -name '*.cu' | sort)
 NATIVE := $(shell find native -type f -not -name '*.md' 2>/dev/null) pyproject.toml
 
+# Changes when the settings do, so that the next build takes them up.
+SETTINGS := $(VLP_CUDA) $(VLP_CUDA_ARCHITECTURES) $(CMAKE_DEFINES)
+ifneq ($(SETTINGS),$(file <build/settings))
+$(shell mkdir -p build)$(file >build/settings,$(SETTINGS))
+endif
+
 .PHONY: demo
 demo: build ## render scenes/cornell_box.blend through Blender and the add-on to out/cornell_box.png
 	@mkdir -p out
@@ -110,6 +116,11 @@ stubs: build .venv/.lint ## write python/vlp_bpt/_native.pyi from the compiled m
 wheel: .venv/.wheel .venv311/.ready .ci/wheel.sh ## dist/*.whl: the package for Python 3.11 and every later one
 	@root=$(if $(filter OFF,$(WHEEL_CUDA)),,$$(.ci/cuda.sh)); CUDA_ROOT=$$root ARCHITECTURES="$(WHEEL_CUDA_ARCHITECTURES)" .ci/wheel.sh .venv311 .venv
 
+.PHONY: sanitize
+sanitize: .venv/.ready ## native tests under the address and undefined-behaviour sanitizers
+	@.ci/system.sh gtest
+	@cd native && export PATH=$(BIN):$$PATH && cmake --preset asan >/dev/null && cmake --build --preset asan && ctest --preset asan
+
 .PHONY: cuda-check
 cuda-check: .venv/.ready ## compile the CUDA code with the PyPI toolchain alone (no GPU needed)
 	@root=$$(.ci/cuda.sh); \
@@ -118,7 +129,7 @@ cuda-check: .venv/.ready ## compile the CUDA code with the PyPI toolchain alone 
 	  cmake --build build/cuda --target vlp_cuda"
 
 .PHONY: gpu-check
-gpu-check: ## on a machine with a GPU, nvcc, cmake, ninja, python3, nanobind, numpy, pytest and nothing else: build, test, bench
+gpu-check: ## build with CUDA and test, on a machine with a GPU and no package registry
 	.ci/gpu-check.sh
 
 ##@ Environments
@@ -142,7 +153,7 @@ gpu-check: ## on a machine with a GPU, nvcc, cmake, ninja, python3, nanobind, nu
 	@touch $@
 
 # An editable install: Python files are used where they lie, the native core is compiled in build/venv* and copied into the environment.
-%/.native: %/.ready $(NATIVE)
+%/.native: %/.ready $(NATIVE) build/settings
 	@.ci/system.sh compiler $*/bin/python
 	@PATH=$(CURDIR)/$*/bin:$$PATH $(UV) pip install --quiet --python $* --no-deps --no-build-isolation \
 	  -C build-dir=build/$(*:.%=%) -C cmake.define.VLP_CUDA=$(VLP_CUDA) -C "cmake.define.VLP_CUDA_ARCHITECTURES=$(VLP_CUDA_ARCHITECTURES)" \

@@ -8,10 +8,13 @@ set -euo pipefail
 uv=.bootstrap/bin/uv out=build/wheels
 export PATH=$PWD/.venv/bin:$PATH
 rm -rf "$out" dist/*.whl
+cuda_library=
 for venv in "$@"; do
   "$uv" build --quiet --wheel --no-build-isolation --python "$venv/bin/python" --out-dir "$out/${venv#.}" \
     -C build-dir="build/wheel-${venv#.}" -C cmake.define.VLP_CUDA="$([ -n "${CUDA_ROOT:-}" ] && echo ON || echo OFF)" \
-    -C cmake.define.VLP_CUDA_ROOT="${CUDA_ROOT:-}" -C "cmake.define.VLP_CUDA_ARCHITECTURES=${ARCHITECTURES:-90}"
+    -C cmake.define.VLP_CUDA_ROOT="${CUDA_ROOT:-}" -C "cmake.define.VLP_CUDA_ARCHITECTURES=${ARCHITECTURES:-90}" \
+    -C cmake.define.VLP_CUDA_LIBRARY="$cuda_library"
+  [ -z "${CUDA_ROOT:-}" ] || cuda_library=$PWD/build/wheel-venv311/libvlp_cuda.a # compiled with the first, used again by the second
 done
 
 wheel unpack --dest "$out/venv311" "$out"/venv311/*.whl >/dev/null
