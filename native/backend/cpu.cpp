@@ -5,6 +5,7 @@
 #include "core/parallel.h"
 #include "integrator/light_tracing.h"
 #include "integrator/path_tracing.h"
+#include "scene/scene.h"
 
 namespace vlp {
 namespace {
@@ -164,8 +165,8 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Backend> make_cpu_backend(const SceneView& scene, const PassSettings& pass, unsigned threads) {
-    return std::make_unique<CpuBackend>(scene, pass, threads);
+std::unique_ptr<Backend> make_cpu_backend(const Scene& scene, const PassSettings& pass, unsigned threads) {
+    return std::make_unique<CpuBackend>(scene.view(), pass, threads);
 }
 
 }  // namespace vlp

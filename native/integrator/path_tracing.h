@@ -116,6 +116,8 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         if (emitter != k_none) {
             const Vec3 normal = face_toward(z.geometric_normal, -ray.direction);
             add(hit_light(scene, pass, eye, throughput, pdf_solid_angle, emitter, z.position, normal, ray.direction));
+        } else if (!is_black(scene.materials[z.material].emission)) {  // an emitter that only hits can find
+            add({0, eye.t + 1, throughput * scene.materials[z.material].emission, 1});
         }
 
         // z becomes the walk's last vertex.
