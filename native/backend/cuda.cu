@@ -40,16 +40,10 @@ __global__ void eye_pass(SceneView scene, PassSettings pass, LightVertexCache ca
     const uint32_t pixel = first_pixel + blockIdx.x * blockDim.x + threadIdx.x;
     if (pixel >= end_pixel) return;
     const uint32_t x = window.x + pixel % window.width, y = window.y + pixel / window.width;
-    Rgb radiance;
-    const float alpha = trace_eye_path(scene, pass, cache, iteration, x, y, [&](const Contribution& c) {
-        const Rgb weighted = c.value * c.weight;
-        if (is_finite(weighted)) {
-            radiance += weighted;
-        } else {
-            atomicAdd(dropped, 1ull);
-        }
-    });
-    frame[pixel] = {{radiance.r, radiance.g, radiance.b, alpha}};
+    PixelSink sink;
+    const float alpha = trace_eye_path(scene, pass, cache, iteration, x, y, sink);
+    if (sink.dropped > 0) atomicAdd(dropped, static_cast<unsigned long long>(sink.dropped));
+    frame[pixel] = {{sink.radiance.r, sink.radiance.g, sink.radiance.b, alpha}};
 }
 
 class CudaBackend final : public Backend {

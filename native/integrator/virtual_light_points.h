@@ -19,11 +19,15 @@ struct EyeWalk {
     VLP_HD const VertexDensity& last() const { return vertices[t - 1]; }
 };
 
-// Where a strategy found light: its estimate without the weight, and the weight.
+// Light that strategy (s, t) found: its estimate without the weight, the weight, and the end of the path that the eye walk
+// does not hold.
 struct Contribution {
     uint32_t s = 0, t = 0;
     Rgb value;
     float weight = 0;
+    uint32_t light = k_none;           // s < 2: the light, and the point y_0 (the direction to it where it is infinite)
+    Vec3 position, normal;
+    const LightVertex* vlp = nullptr;  // s >= 2: y_{s-1}
 };
 
 VLP_HD inline SurfacePoint surface_of(const LightVertex& vlp) {
@@ -62,27 +66,27 @@ VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, c
                                                        const Bsdf& eye_bsdf, uint32_t u) {
     const uint64_t draw = (static_cast<uint64_t>(u) * cache.stored_count) >> 32;
     const LightVertex* vlp = cache.slots + cache.stored[draw];
-    Contribution none{vlp->index() + 1, eye.t, {}, 0};
-
+    Contribution found{.s = vlp->index() + 1, .t = eye.t, .vlp = vlp};
     const SurfacePoint point = surface_of(*vlp);
     const Edge edge = edge_between(eye.surface.position, point.position);
     const float cos_eye = abs_dot(eye.surface.geometric_normal, edge.direction);
     const float cos_vlp = abs_dot(point.geometric_normal, edge.direction);
     const float geometry = cos_eye * cos_vlp / edge.dist_squared;
-    if (!(geometry > 0) || !is_finite(geometry)) return none;
+    if (!(geometry > 0) || !is_finite(geometry)) return found;
 
     const Rgb f_eye = eval(eye_bsdf, eye.w_eye, edge.direction);
-    if (is_black(f_eye)) return none;
+    if (is_black(f_eye)) return found;
     const Bsdf vlp_bsdf = make_bsdf(scene, point);
     const Vec3 to_previous = decode(vlp->to_previous);
     const Rgb f_vlp = eval(vlp_bsdf, -edge.direction, to_previous);
-    if (is_black(f_vlp)) return none;
+    if (is_black(f_vlp)) return found;
 
     const Rgb through = transmittance(scene, anchor_of(eye.surface), anchor_of(point), edge.direction);
-    if (is_black(through)) return none;
+    if (is_black(through)) return found;
     const float vlps_per_path = static_cast<float>(cache.stored_count) / static_cast<float>(pass.light_paths);
-    return {none.s, none.t, eye.throughput * f_eye * f_vlp * vlp->throughput * through * (geometry * vlps_per_path),
-            connection_weight(pass, eye, eye_bsdf, vlp, vlp_bsdf, to_previous, edge, cos_eye, cos_vlp)};
+    found.value = eye.throughput * f_eye * f_vlp * vlp->throughput * through * (geometry * vlps_per_path);
+    found.weight = connection_weight(pass, eye, eye_bsdf, vlp, vlp_bsdf, to_previous, edge, cos_eye, cos_vlp);
+    return found;
 }
 
 }  // namespace vlp
