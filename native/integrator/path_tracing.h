@@ -47,8 +47,8 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
     found.position = is_infinite(light) ? event.direction : event.position;
     found.normal = event.normal;
     const float cos_x_1 = abs_dot(eye.surface.geometric_normal, event.direction);
-    const Rgb f = eval(bsdf, eye.w_eye, event.direction);
-    if (!(cos_x_1 > 0) || is_black(f)) return found;
+    const LobeValue at_x_1 = evaluate(bsdf, eye.w_eye, event.direction);
+    if (!(cos_x_1 > 0) || is_black(at_x_1.f)) return found;
 
     const Anchor from = anchor_of(eye.surface);
     const Rgb through =
@@ -57,20 +57,19 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
             : transmittance(scene, from, Anchor{event.position, event.normal, event.surface}, event.direction);
     if (is_black(through)) return found;
     const float pdf_next_event = choice.pdf * event.pdf_solid_angle;
-    found.value = eye.throughput * f * event.radiance * through * (cos_x_1 / pdf_next_event);
+    found.value = eye.throughput * at_x_1.f * event.radiance * through * (cos_x_1 / pdf_next_event);
 
     const uint32_t n = eye.t + 1;
     const float dist_squared = event.distance * event.distance;
     StrategySum sum = strategy_sum(pass, 1);
     if (!event.delta && n <= pass.eye_path_length + 1) {
-        sum.add(pdf(bsdf, eye.w_eye, event.direction) / pdf_next_event, strategy_count(pass, 0));
+        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0));
     }
     if (pass.light_path_length > 0 && eye.t > 2) {
         const LightEnd end =
             light_end(scene, choice.index, x_1, event.position, event.normal, event.direction, dist_squared);
         const float ratio = end.pdf_emission / end.pdf_next_event * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
-        const float next_ratio = pdf(bsdf, event.direction, eye.w_eye) * eye.last().rev_geometry;
-        add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, next_ratio);
+        add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, at_x_1.pdf_eye * eye.last().rev_geometry);
     }
     found.weight = sum.weight();
     return found;
