@@ -12,6 +12,8 @@
 
 namespace vlp {
 
+class Scene;
+
 // What an iteration did, and how far the one under way is; read from any thread.
 struct BackendCounters {
     std::atomic<uint32_t> work_done{0}, work_total{1};  // pieces of the iteration under way
@@ -30,9 +32,10 @@ public:
     BackendCounters counters;
 };
 
-std::unique_ptr<Backend> make_cpu_backend(const SceneView& scene, const PassSettings& pass, unsigned threads);
+// The scene must outlive its back ends.
+std::unique_ptr<Backend> make_cpu_backend(const Scene& scene, const PassSettings& pass, unsigned threads);
 // Throws std::runtime_error, naming the reason, when there is no usable GPU or it has too little memory.
-std::unique_ptr<Backend> make_cuda_backend(const SceneView& scene, const PassSettings& pass, Window window);
+std::unique_ptr<Backend> make_cuda_backend(const Scene& scene, const PassSettings& pass);
 
 struct DeviceInfo {
     std::string kind;  // "CPU" or "CUDA"

@@ -5,6 +5,7 @@
 #include "core/parallel.h"
 #include "integrator/light_tracing.h"
 #include "integrator/path_tracing.h"
+#include "scene/scene.h"
 
 namespace vlp {
 namespace {
@@ -137,17 +138,12 @@ private:
         uint64_t dropped = 0;
         for (uint32_t y = tile.y * k_tile; y < y_end; ++y) {
             for (uint32_t x = tile.x * k_tile; x < x_end; ++x) {
-                Rgb radiance;
-                const float alpha = trace_eye_path(
-                    scene_, pass_, cache, iteration, window.x + x, window.y + y, [&](const Contribution& c) {
-                        const Rgb weighted = c.value * c.weight;
-                        if (is_finite(weighted)) {
-                            radiance += weighted;
-                        } else {
-                            ++dropped;
-                        }
-                    });
-                film.frame()[static_cast<size_t>(y) * window.width + x] = {{radiance.r, radiance.g, radiance.b, alpha}};
+                PixelSink sink;
+                const float alpha =
+                    trace_eye_path(scene_, pass_, cache, iteration, window.x + x, window.y + y, sink);
+                dropped += sink.dropped;
+                const Rgb c = sink.radiance;
+                film.frame()[static_cast<size_t>(y) * window.width + x] = {{c.r, c.g, c.b, alpha}};
             }
         }
         if (dropped > 0) counters.dropped.fetch_add(dropped, std::memory_order_relaxed);
@@ -164,8 +160,8 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Backend> make_cpu_backend(const SceneView& scene, const PassSettings& pass, unsigned threads) {
-    return std::make_unique<CpuBackend>(scene, pass, threads);
+std::unique_ptr<Backend> make_cpu_backend(const Scene& scene, const PassSettings& pass, unsigned threads) {
+    return std::make_unique<CpuBackend>(scene.view(), pass, threads);
 }
 
 }  // namespace vlp

@@ -1,5 +1,14 @@
-// Placeholder: the symbols of cuda.cu for builds without CUDA.
+// Stands in for the CUDA back end in builds without it.
+#include <stdexcept>
+
+#include "backend/backend.h"
+
 namespace vlp {
-int cuda_device_count();
-int cuda_device_count() { return 0; }
-} // namespace vlp
+
+std::unique_ptr<Backend> make_cuda_backend(const Scene&, const PassSettings&) {
+    throw std::runtime_error("device CUDA: this build of VLP-BPT has no CUDA back end; choose CPU");
+}
+
+std::vector<DeviceInfo> cuda_devices() { return {}; }
+
+}  // namespace vlp

@@ -11,8 +11,8 @@ namespace vlp {
 // A sum of floats in 128-bit fixed point with 64 bits after the point: exact for values of 2^-40 and more (smaller ones
 // lose what is below 2^-64), whatever the order, for 2^63 in all.
 struct ExactSum {
+    uint64_t fraction = 0;  // in units of 2^-64
     int64_t whole = 0;
-    uint64_t fraction = 0;
 
     void add(const ExactSum& other) {
         fraction += other.fraction;
@@ -21,8 +21,8 @@ struct ExactSum {
     // `value` must be finite, not negative and below 2^62.
     void add(float value) {
         const double whole_part = std::floor(static_cast<double>(value));
-        add({static_cast<int64_t>(whole_part),
-             static_cast<uint64_t>((static_cast<double>(value) - whole_part) * 0x1p64)});
+        add({static_cast<uint64_t>((static_cast<double>(value) - whole_part) * 0x1p64),
+             static_cast<int64_t>(whole_part)});
     }
     double value() const { return static_cast<double>(whole) + static_cast<double>(fraction) * 0x1p-64; }
 };

@@ -13,7 +13,11 @@ VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings&
                                      Vec3 direction) {
     const Light& light = scene.lights[light_index];
     const uint32_t t = eye.t + 1;
-    Contribution c{0, t, throughput * emitted(scene, light, position, normal, -direction), 1};
+    Contribution c{.s = 0, .t = t, .value = throughput * emitted(scene, light, position, normal, -direction)};
+    c.weight = 1;
+    c.light = light_index;
+    c.position = is_infinite(light) ? direction : position;
+    c.normal = normal;
     if (is_black(c.value) || t == 2) return c;  // only the eye walk itself sees a light directly
 
     const Vec3 x_1 = eye.surface.position;
@@ -33,47 +37,49 @@ VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings&
 // Next event at z_{t-1}: one of the S samples of a light (strategy s = 1).
 VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye,
                                         const Bsdf& bsdf, uint32_t u_light, Vec2 u) {
-    Contribution none{1, eye.t, {}, 0};
+    Contribution found{.s = 1, .t = eye.t};
     const DiscreteSample choice = choose_light(scene, u_light);
     const Light& light = scene.lights[choice.index];
     const Vec3 x_1 = eye.surface.position;
     const NextEvent event = sample_next_event(scene, light, x_1, u);
-    if (!event.valid()) return none;
+    if (!event.valid()) return found;
+    found.light = choice.index;
+    found.position = is_infinite(light) ? event.direction : event.position;
+    found.normal = event.normal;
     const float cos_x_1 = abs_dot(eye.surface.geometric_normal, event.direction);
-    const Rgb f = eval(bsdf, eye.w_eye, event.direction);
-    if (!(cos_x_1 > 0) || is_black(f)) return none;
+    const LobeValue at_x_1 = evaluate(bsdf, eye.w_eye, event.direction);
+    if (!(cos_x_1 > 0) || is_black(at_x_1.f)) return found;
 
     const Anchor from = anchor_of(eye.surface);
     const Rgb through =
         is_infinite(light)
             ? transmittance(scene, Ray{leave(from, event.direction), event.direction}, from.id, {})
             : transmittance(scene, from, Anchor{event.position, event.normal, event.surface}, event.direction);
-    if (is_black(through)) return none;
+    if (is_black(through)) return found;
     const float pdf_next_event = choice.pdf * event.pdf_solid_angle;
-    none.value = eye.throughput * f * event.radiance * through * (cos_x_1 / pdf_next_event);
+    found.value = eye.throughput * at_x_1.f * event.radiance * through * (cos_x_1 / pdf_next_event);
 
     const uint32_t n = eye.t + 1;
     const float dist_squared = event.distance * event.distance;
     StrategySum sum = strategy_sum(pass, 1);
     if (!event.delta && n <= pass.eye_path_length + 1) {
-        sum.add(pdf(bsdf, eye.w_eye, event.direction) / pdf_next_event, strategy_count(pass, 0));
+        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0));
     }
     if (pass.light_path_length > 0 && eye.t > 2) {
         const LightEnd end =
             light_end(scene, choice.index, x_1, event.position, event.normal, event.direction, dist_squared);
         const float ratio = end.pdf_emission / end.pdf_next_event * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
-        const float next_ratio = pdf(bsdf, event.direction, eye.w_eye) * eye.last().rev_geometry;
-        add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, next_ratio);
+        add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, at_x_1.pdf_eye * eye.last().rev_geometry);
     }
-    none.weight = sum.weight();
-    return none;
+    found.weight = sum.weight();
+    return found;
 }
 
 // The radiance that one path through pixel (x, y) of the full picture finds, y counted from the bottom. Each strategy's
-// share goes to `add(Contribution)`; returns the pixel's alpha.
-template <typename F>
+// share goes to sink.add(Contribution), each vertex of the walk to sink.visit(EyeWalk). Returns the pixel's alpha.
+template <typename Sink>
 VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& pass, const LightVertexCache& cache,
-                                   uint32_t iteration, uint32_t x, uint32_t y, F&& add) {
+                                   uint32_t iteration, uint32_t x, uint32_t y, Sink& sink) {
     const uint32_t seed = hash(pass.seed, k_eye_stream, y * scene.camera.width + x);
     Sampler sampler = make_sampler(seed, iteration);
     const Vec2 center{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
@@ -96,8 +102,8 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         const auto find_lamps = [&](const Ray& stretch, Rgb through) {
             for_each_lamp_hit(scene, stretch, [&](uint32_t light, float, Vec3 position, Vec3 normal) {
                 if (from_camera && !(scene.lights[light].visibility & k_visible_to_camera)) return;
-                add(hit_light(scene, pass, eye, eye.throughput * through, pdf_solid_angle, light, position, normal,
-                              ray.direction));
+                sink.add(hit_light(scene, pass, eye, eye.throughput * through, pdf_solid_angle, light, position, normal,
+                                   ray.direction));
             });
         };
         const Step step = walk(scene, ray, skip, from_camera, key, find_lamps);
@@ -107,7 +113,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
             for (uint32_t i = 0; i < scene.infinite_light_count; ++i) {
                 const uint32_t light = scene.infinite_lights[i];
                 if (from_camera && !(scene.lights[light].visibility & k_visible_to_camera)) continue;
-                add(hit_light(scene, pass, eye, throughput, pdf_solid_angle, light, {}, -ray.direction, ray.direction));
+                sink.add(hit_light(scene, pass, eye, throughput, pdf_solid_angle, light, {}, -ray.direction, ray.direction));
             }
             break;
         }
@@ -115,7 +121,9 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         const uint32_t emitter = light_of_surface(scene, z.instance, z.primitive);
         if (emitter != k_none) {
             const Vec3 normal = face_toward(z.geometric_normal, -ray.direction);
-            add(hit_light(scene, pass, eye, throughput, pdf_solid_angle, emitter, z.position, normal, ray.direction));
+            sink.add(hit_light(scene, pass, eye, throughput, pdf_solid_angle, emitter, z.position, normal, ray.direction));
+        } else if (!is_black(scene.materials[z.material].emission)) {  // an emitter that only hits can find
+            sink.add({.s = 0, .t = eye.t + 1, .value = throughput * scene.materials[z.material].emission, .weight = 1});
         }
 
         // z becomes the walk's last vertex.
@@ -133,6 +141,8 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         eye.surface = z;
         eye.w_eye = -ray.direction;
 
+        sink.visit(eye);
+
         const Bsdf bsdf = make_bsdf(scene, z);
         const float u_lobe = sampler.next();
         const Vec2 u_direction = sampler.next_2d();
@@ -142,12 +152,12 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
                 const uint32_t u_light = sampler.next_bits();
                 Contribution c = sample_light(scene, pass, eye, bsdf, u_light, sampler.next_2d());
                 c.value *= 1.0f / static_cast<float>(pass.light_samples);
-                add(c);
+                sink.add(c);
             }
             for (uint32_t i = 0; has_vlps && i < pass.vlp_connections; ++i) {
                 Contribution c = connect_virtual_light_point(scene, pass, cache, eye, bsdf, sampler.next_bits());
                 c.value *= 1.0f / static_cast<float>(pass.vlp_connections);
-                add(c);
+                sink.add(c);
             }
         }
         if (hits == pass.eye_path_length) break;
@@ -170,5 +180,21 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
     }
     return alpha;
 }
+
+// Sums up what a pixel's path finds, leaving out estimates that are not finite.
+struct PixelSink {
+    Rgb radiance;
+    uint32_t dropped = 0;
+
+    VLP_HD void add(const Contribution& c) {
+        const Rgb weighted = c.value * c.weight;
+        if (is_finite(weighted)) {
+            radiance += weighted;
+        } else {
+            ++dropped;
+        }
+    }
+    VLP_HD void visit(const EyeWalk&) {}
+};
 
 }  // namespace vlp

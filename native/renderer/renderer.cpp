@@ -1,6 +1,8 @@
 // Iterations, the pilot that fixes kappa, deadlines and cancellation.
 #include "renderer/renderer.h"
 
+#include <stdexcept>
+
 #include "integrator/light_tracing.h"
 #include "scene/scene.h"
 
@@ -27,10 +29,11 @@ PassSettings with_kappa(const SceneView& scene, PassSettings pass) {
     return pass;
 }
 
-std::unique_ptr<Backend> make_backend(const std::string& device, const SceneView& scene, const PassSettings& pass,
-                                      Window window, unsigned threads) {
-    if (device == "CUDA") return make_cuda_backend(scene, pass, window);
-    return make_cpu_backend(scene, pass, threads);
+std::unique_ptr<Backend> make_backend(const std::string& device, const Scene& scene, const PassSettings& pass,
+                                      unsigned threads) {
+    if (device == "CUDA") return make_cuda_backend(scene, pass);
+    if (device == "AUTO" || device == "CPU") return make_cpu_backend(scene, pass, threads);
+    throw std::runtime_error("device " + device + " is not available in this version: choose AUTO, CPU or CUDA");
 }
 
 }  // namespace
@@ -40,10 +43,11 @@ Renderer::Renderer(std::shared_ptr<const Scene> scene, PassSettings pass, const 
     : scene_(std::move(scene)),
       pass_(with_kappa(scene_->view(), pass)),
       film_(scene_->window()),
-      backend_(make_backend(device, scene_->view(), pass_, scene_->window(), threads)),
+      backend_(make_backend(device, *scene_, pass_, threads)),
       next_iteration_(first_iteration) {}
 
 uint32_t Renderer::iterate(uint32_t count) {
+    stop_ = false;
     uint32_t done = 0;
     while (done < count && !stop_ && std::chrono::steady_clock::now() < deadline_) {
         if (!backend_->run_iteration(next_iteration_, film_, stop_)) break;

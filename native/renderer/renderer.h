@@ -20,14 +20,15 @@ public:
 
     // Runs up to `count` iterations; fewer when cancelled or past the deadline. Returns how many were completed.
     uint32_t iterate(uint32_t count);
+    // Makes the `iterate` that is running return within milliseconds, the iteration under way undone; from any thread.
     void cancel() { stop_ = true; }
-    bool cancelled() const { return stop_; }
     // From now; no iteration starts later. 0 or less: no deadline.
     void set_deadline(double seconds);
 
     float progress() const;  // of the iteration under way, 0 to 1
     const BackendCounters& counters() const { return backend_->counters; }
     const PassSettings& pass() const { return pass_; }
+    const Scene& scene() const { return *scene_; }
     Film& film() { return film_; }
     const Film& film() const { return film_; }
     size_t backend_bytes() const { return backend_->bytes(); }
