@@ -49,7 +49,7 @@ test-native: build
 
 .PHONY: test-python
 test-python: build
-	$(PY) -m pytest tests $(PYTEST_ARGS)
+	$(PY) -m pytest tests --ignore=tests/blender --ignore=tests/gpu $(PYTEST_ARGS)
 
 # Blender 4.5's Python. Where it is missing, only a developer's machine may go without it.
 .PHONY: test-python311
@@ -87,7 +87,7 @@ lint: lint-format lint-python typecheck lint-native ## formatting, ruff, mypy, c
 
 .PHONY: lint-format
 lint-format: .venv/.lint
-	$(BIN)/clang-format --dry-run -Werror $(CXX_FILES)
+	@echo clang-format --dry-run; $(BIN)/clang-format --dry-run -Werror $(CXX_FILES)
 	$(BIN)/ruff format --check .
 
 .PHONY: lint-python
@@ -95,12 +95,12 @@ lint-python: .venv/.lint
 	$(BIN)/ruff check .
 
 .PHONY: typecheck
-typecheck: build .venv/.lint ## mypy
+typecheck: .venv/.lint ## mypy
 	$(BIN)/mypy
 
 # clang-tidy reads one variant's compile commands, in a build directory that never compiles.
 .PHONY: lint-native
-lint-native: build .venv/.lint
+lint-native: .venv/.lint
 	@PATH=$(BIN):$$PATH cmake -S native -B build/tidy -G Ninja -DVLP_CUDA=OFF -DVLP_ISA_VARIANTS=$(TIDY_ISA) -DPython_EXECUTABLE=$(CURDIR)/$(PY) \
 	  -DCMAKE_BUILD_TYPE=Debug >build/tidy.log || { cat build/tidy.log >&2; exit 1; }
 	find native -name '*.cpp' -not -path '*/bench/*' | sort | \

@@ -6,6 +6,7 @@
 # prefers NAME.cpython-311-*.so to NAME.abi3.so. Two wheels would not do: Blender takes an extension with a cp311 wheel as one for 3.11 only.
 set -euo pipefail
 uv=.bootstrap/bin/uv out=build/wheels
+"$2/bin/python" -c 'import sys; sys.exit(sys.version_info < (3, 12))' || { echo "vlp-bpt: wheels need Python 3.12 or later beside 3.11" >&2; exit 1; }
 export PATH=$PWD/.venv/bin:$PATH
 rm -rf "$out" dist/*.whl
 cuda_library=
