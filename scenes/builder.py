@@ -119,35 +119,37 @@ def mesh_sphere(
     return obj
 
 
+def applied(obj: bpy.types.Object) -> bpy.types.Mesh:
+    """The mesh that the object's modifiers make; the object itself is removed."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    data = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), depsgraph=depsgraph)
+    source, data.name = obj.data, obj.name
+    bpy.data.objects.remove(obj)
+    bpy.data.meshes.remove(source)
+    return data
+
+
 def spheres(
     name: str, centers: np.ndarray, radii: np.ndarray, material: bpy.types.Material
 ) -> bpy.types.Object:
     """A point cloud object, each point a sphere; centers (n, 3) and radii (n,).
 
-    Blender 4.5 has no call that sets the number of points, so geometry nodes turn a mesh of loose vertices into
-    points once and the result is converted to stored data.
+    Blender 4.5 has no call that sets the number of points, but it converts a mesh of loose vertices.
     """
     data = bpy.data.meshes.new(name)
     data.from_pydata(np.asarray(centers).tolist(), [], [])
     obj = link(data, name)
-    group = bpy.data.node_groups.new("To points", "GeometryNodeTree")
-    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    to_points = group.nodes.new("GeometryNodeMeshToPoints")
-    source, target = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
-    group.links.new(source.outputs[0], to_points.inputs["Mesh"])
-    group.links.new(to_points.outputs["Points"], target.inputs[0])
-    obj.modifiers.new("To points", "NODES").node_group = group
     bpy.ops.object.select_all(action="DESELECT")
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
     bpy.ops.object.convert(target="POINTCLOUD")
     bpy.data.meshes.remove(data)
-    bpy.data.node_groups.remove(group)
     cloud = obj.data
     cloud.name = name
-    cloud.attributes["radius"].data.foreach_set("value", np.asarray(radii, np.float32))
-    cloud.materials.clear()
+    for attribute in [a for a in cloud.attributes if a.name.startswith(".select")]:
+        cloud.attributes.remove(attribute)
+    radius = cloud.attributes.new("radius", "FLOAT", "POINT")
+    radius.data.foreach_set("value", np.asarray(radii, np.float32))
     cloud.materials.append(material)
     return obj
 
@@ -194,8 +196,8 @@ class _StandIn(bpy.types.RenderEngine):
     bl_label = "VLP-BPT"
 
 
-def save(scene: bpy.types.Scene, name: str) -> Path:
-    """Choose the engine and write `scenes/NAME.blend`, compressed."""
+def save(scene: bpy.types.Scene, name: str, path: Path | None = None) -> Path:
+    """Choose the engine and write `path`, compressed; without a path, `scenes/NAME.blend`."""
     try:
         scene.render.engine = ENGINE
     except TypeError:
@@ -204,7 +206,7 @@ def save(scene: bpy.types.Scene, name: str) -> Path:
     for space in (s for screen in bpy.data.screens for area in screen.areas for s in area.spaces):
         if space.type == "FILE_BROWSER" and space.params:
             space.params.directory = b"//"  # not the home directory of whoever made the file
-    path = HERE / f"{name}.blend"
+    path = path.resolve() if path else HERE / f"{name}.blend"
     bpy.context.preferences.filepaths.save_version = 0
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
     print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB")
