@@ -105,9 +105,7 @@ def block(name: str, low: Point, high: Point, material: bpy.types.Material) -> b
     return mesh(name, corners, faces, material)
 
 
-def mesh_sphere(
-    name: str, center: Point, radius: float, levels: int, material: bpy.types.Material
-) -> bpy.types.Object:
+def mesh_sphere(name: str, center: Point, radius: float, levels: int, material: bpy.types.Material) -> bpy.types.Object:
     """A smooth sphere made by modifiers: a cube subdivided `levels` times (6 * 4**levels quads) and cast to a sphere."""
     obj = block(name, (-1, -1, -1), (1, 1, 1), material)
     obj.data.polygons.foreach_set("use_smooth", [True] * 6)
@@ -129,9 +127,7 @@ def applied(obj: bpy.types.Object) -> bpy.types.Mesh:
     return data
 
 
-def spheres(
-    name: str, centers: np.ndarray, radii: np.ndarray, material: bpy.types.Material
-) -> bpy.types.Object:
+def spheres(name: str, centers: np.ndarray, radii: np.ndarray, material: bpy.types.Material) -> bpy.types.Object:
     """A point cloud object, each point a sphere; centers (n, 3) and radii (n,).
 
     Blender 4.5 has no call that sets the number of points, but it converts a mesh of loose vertices.

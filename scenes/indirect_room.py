@@ -66,8 +66,8 @@ def main() -> None:
     add_rooms(white, warm)
     add_door(wood)
     add_furniture()
-    # Next door, high on the left, shining at the far wall: nothing on this side of the doorway sees it.
-    builder.area_lamp("light", (800.0, 700.0, 575.0), (0.6, 0.6), (-1.3, 2.3, 2.3), (-0.9, 4.0, 1.2))
+    # Next door on the left, shining straight at the far wall: it lights nothing with y < 2.1, so nothing on this side.
+    builder.area_lamp("light", (800.0, 700.0, 575.0), (0.6, 0.6), (-1.2, 2.1, 1.6), (-1.2, 4.0, 1.6))
     builder.camera(scene, (-0.5, -2.2, 1.45), (-0.05, 1.0, 1.02), 24.0, 32.0, clip_start=0.05)
     builder.save(scene, "indirect_room")
 

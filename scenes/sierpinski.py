@@ -64,8 +64,9 @@ def materials() -> dict[str, builder.bpy.types.Material]:
     }
 
 
-def add_instances(name: str, centers: np.ndarray, radii: np.ndarray, levels: int,
-                  material: builder.bpy.types.Material) -> None:
+def add_instances(
+    name: str, centers: np.ndarray, radii: np.ndarray, levels: int, material: builder.bpy.types.Material
+) -> None:
     """The same spheres as instances of one smooth mesh."""
     data = builder.applied(builder.mesh_sphere(name, (0, 0, 0), 1.0, levels, material))
     for i, (center, radius) in enumerate(zip(centers, radii, strict=True)):

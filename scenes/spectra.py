@@ -68,6 +68,10 @@ def light_rgb() -> tuple[float, float, float]:
 
 
 if __name__ == "__main__":
-    for label, value in (("white", reflectance_rgb(WHITE)), ("green", reflectance_rgb(GREEN)),
-                         ("red", reflectance_rgb(RED)), ("light", light_rgb())):
+    for label, value in (
+        ("white", reflectance_rgb(WHITE)),
+        ("green", reflectance_rgb(GREEN)),
+        ("red", reflectance_rgb(RED)),
+        ("light", light_rgb()),
+    ):
         print(label, *(f"{v:.4f}" for v in value))
