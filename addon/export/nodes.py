@@ -1,0 +1,160 @@
+"""Follows links through a shader tree: reroutes, groups and muted nodes, on every Blender version.
+
+Blender 5.0 and later inline groups, repeat zones and closures themselves (`InlineShaderNodes`); 4.5 leaves it to us.
+Sockets are addressed by identifier: their names change between versions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+from .constants import FOLDABLE, Value, convert
+from .notes import Notes
+
+# Nodes that a link passes straight through are followed at most this often: a tree that loops ends.
+MAX_STEPS = 1000
+
+
+@dataclass(frozen=True)
+class Place:
+    """A socket, and the group nodes (outermost first) that it lies in."""
+
+    socket: Any
+    groups: tuple[Any, ...] = ()
+
+    @property
+    def node(self) -> Any:
+        return self.socket.node
+
+    def input(self, identifier: str) -> Place | None:
+        """The input socket of this socket's node, or None where this version's node has none of that name."""
+        for socket in self.socket.node.inputs:
+            if socket.identifier == identifier:
+                return Place(socket, self.groups)
+        return None
+
+
+class Graph:
+    """The shader tree of a material, world or light: what is linked where, and the constants that come out."""
+
+    def __init__(self, datablock: Any, kind: str, notes: Notes) -> None:
+        self.owner = f"{kind} '{datablock.name}'"
+        self.notes = notes
+        self.tree, self._inline = _inlined(datablock, kind)
+        self._links: dict[int, dict[int, Any]] = {}
+
+    def output(self, bl_idname: str, identifier: str) -> Place | None:
+        """What is linked to the active output node's input, or None."""
+        outputs = [node for node in self.tree.nodes if node.bl_idname == bl_idname and not node.mute]
+        outputs = [node for node in outputs if getattr(node, "target", "ALL") in ("ALL", "CYCLES")] or outputs
+        if not outputs:
+            return None
+        outputs.sort(key=lambda node: (getattr(node, "target", "ALL") == "CYCLES", node.is_active_output))
+        place = Place(outputs[-1].outputs[0] if outputs[-1].outputs else outputs[-1].inputs[0]).input(identifier)
+        return None if place is None else self.source(place)
+
+    def source(self, place: Place) -> Place | None:
+        """The output socket that feeds an input, or None where it stands on its own value."""
+        found = self._follow(place)
+        return found if found.socket.is_output else None
+
+    def value(self, place: Place) -> Value:
+        """The constant at an input, as its own socket's type: folded where the nodes before it are constant.
+
+        What is not constant is replaced by its nearest constant and reported once.
+        """
+        found = self._follow(place)
+        kind = place.socket.type
+        if not found.socket.is_output:
+            return convert(own_value(found.socket), kind)
+        node = found.node
+        fold = FOLDABLE.get(node.bl_idname)
+        result = fold(self, found) if fold else None
+        if result is None:
+            self.notes.warn(f"{self.owner}: {label(node)} is not there yet, a constant stands in for it")
+            return convert(own_value(place.socket), kind)
+        return convert(result, kind)
+
+    def number(self, place: Place | None, default: float = 0.0) -> float:
+        """The constant at an input as a number; `default` where the node has no such input."""
+        return default if place is None else float(convert(self.value(place), "VALUE"))  # type: ignore[arg-type]
+
+    def color(self, place: Place | None, default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[float, ...]:
+        """The constant at an input as a colour; `default` where the node has no such input."""
+        if place is None:
+            return default
+        return convert(self.value(place), "RGBA")  # type: ignore[return-value]
+
+    def _follow(self, place: Place) -> Place:
+        """From an input to what feeds it: an output of a node that does something, or an input with its own value."""
+        for _ in range(MAX_STEPS):
+            if place.socket.is_output:
+                step = self._through(place)
+                if step is None:
+                    return place
+            else:
+                step = self._linked(place)
+                if step is None:
+                    return place
+            place = step
+        self.notes.warn(f"{self.owner}: the node tree links back to itself")
+        return place
+
+    def _linked(self, place: Place) -> Place | None:
+        """The output that is linked to an input, if any."""
+        tree = place.socket.id_data
+        key = tree.as_pointer()
+        if key not in self._links:
+            live = (link for link in tree.links if not link.is_muted and link.is_valid)
+            self._links[key] = {link.to_socket.as_pointer(): link.from_socket for link in live}
+        source = self._links[key].get(place.socket.as_pointer())
+        return None if source is None else Place(source, place.groups)
+
+    def _through(self, place: Place) -> Place | None:
+        """The input that an output hands on unchanged, or None where its node does something."""
+        node, identifier = place.node, place.socket.identifier
+        if node.mute:
+            for link in node.internal_links:
+                if link.to_socket == place.socket:
+                    return Place(link.from_socket, place.groups)
+            return None
+        if node.bl_idname == "NodeReroute":
+            return Place(node.inputs[0], place.groups)
+        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
+            outputs = [inner for inner in node.node_tree.nodes if inner.bl_idname == "NodeGroupOutput"]
+            for inner in sorted(outputs, key=lambda inner: not inner.is_active_output):
+                for socket in inner.inputs:
+                    if socket.identifier == identifier:
+                        return Place(socket, (*place.groups, node))
+            return None
+        if node.bl_idname == "NodeGroupInput" and place.groups:
+            for socket in place.groups[-1].inputs:
+                if socket.identifier == identifier:
+                    return Place(socket, place.groups[:-1])
+        return None
+
+
+def _inlined(datablock: Any, kind: str) -> tuple[Any, Any]:
+    """The datablock's tree without groups where Blender can do that; the second value keeps the first alive."""
+    inline = getattr(bpy.types, "InlineShaderNodes", None)
+    if inline is None:
+        return datablock.node_tree, None
+    flat = getattr(inline, f"from_{kind.lower()}")(datablock)
+    return flat.node_tree, flat
+
+
+def own_value(socket: Any) -> Value:
+    """An unlinked socket's value; black where it has none (a shader, or a normal that means the surface's own)."""
+    value = getattr(socket, "default_value", None)
+    if value is None or isinstance(value, str):
+        return 0.0
+    return tuple(value[:3]) if hasattr(value, "__len__") else float(value)
+
+
+def label(node: Any) -> str:
+    """A node as the artist sees it: its type, and its name where that says more."""
+    kind = node.bl_label or node.bl_idname
+    return f"node {kind}" if node.name.split(".")[0] == kind else f"node {kind} ('{node.name}')"
