@@ -44,7 +44,7 @@ _MATH: dict[str, Callable[[float, float, float], float]] = {
     "MULTIPLY": lambda a, b, c: a * b,
     "DIVIDE": lambda a, b, c: a / b if b else 0.0,
     "MULTIPLY_ADD": lambda a, b, c: a * b + c,
-    "POWER": lambda a, b, c: math.pow(a, b) if a > 0 or b == int(b) and (a or b >= 0) else 0.0,
+    "POWER": lambda a, b, c: math.pow(a, b) if a > 0 or (b == int(b) and (a or b >= 0)) else 0.0,
     "SQRT": lambda a, b, c: math.sqrt(a) if a > 0 else 0.0,
     "ABSOLUTE": lambda a, b, c: abs(a),
     "MINIMUM": lambda a, b, c: min(a, b),

@@ -74,7 +74,7 @@ def _emitted(data: Any, notes: Notes) -> Any:
     if data.node_tree is None or (bpy.app.version < (5, 2, 0) and not data.use_nodes):
         return np.ones(3)
     graph = Graph(data, "Light", notes)
-    place = graph.output("ShaderNodeOutputLight", "Surface")
+    place = graph.output("Surface")
     if place is None:
         return np.zeros(3)
     if place.socket.type != "SHADER":

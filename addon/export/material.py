@@ -32,9 +32,9 @@ def export_material(material: Any, notes: Notes) -> Material:
         return materials.diffuse(tuple(material.diffuse_color[:3]), name=material.name)
     graph = Graph(material, "Material", notes)
     for identifier, kind in (("Volume", "volumes are"), ("Displacement", "displacement is")):
-        if graph.output("ShaderNodeOutputMaterial", identifier) is not None:
+        if graph.output(identifier) is not None:
             notes.warn(f"{graph.owner}: {kind} not there yet, left out")
-    surface = _shader(graph, graph.output("ShaderNodeOutputMaterial", "Surface"), 0)
+    surface = _shader(graph, graph.output("Surface"), 0)
     return replace(surface, name=material.name)
 
 

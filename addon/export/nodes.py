@@ -46,15 +46,13 @@ class Graph:
         self.tree, self._inline = _inlined(datablock, kind)
         self._links: dict[int, dict[int, Any]] = {}
 
-    def output(self, bl_idname: str, identifier: str) -> Place | None:
-        """What is linked to the active output node's input, or None."""
-        outputs = [node for node in self.tree.nodes if node.bl_idname == bl_idname and not node.mute]
-        outputs = [node for node in outputs if getattr(node, "target", "ALL") in ("ALL", "CYCLES")] or outputs
-        if not outputs:
-            return None
-        outputs.sort(key=lambda node: (getattr(node, "target", "ALL") == "CYCLES", node.is_active_output))
-        place = Place(outputs[-1].outputs[0] if outputs[-1].outputs else outputs[-1].inputs[0]).input(identifier)
-        return None if place is None else self.source(place)
+    def output(self, identifier: str) -> Place | None:
+        """What is linked to an input of the tree's active output node, or None."""
+        node = self.tree.get_output_node("CYCLES")
+        for socket in node.inputs if node else ():
+            if socket.identifier == identifier:
+                return self.source(Place(socket))
+        return None
 
     def source(self, place: Place) -> Place | None:
         """The output socket that feeds an input, or None where it stands on its own value."""

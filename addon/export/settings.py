@@ -8,6 +8,12 @@ from typing import Any
 from vlp_bpt.settings import RenderSettings
 
 
-def export_settings(properties: Any) -> RenderSettings:
-    """Every setting by its own name, which is the same on both sides. Raises `vlp_bpt.SettingsError` as a check."""
-    return RenderSettings.from_dict({field.name: getattr(properties, field.name) for field in fields(RenderSettings)})
+def export_settings(scene: Any) -> RenderSettings:
+    """Every setting by its own name, the same on both sides. Raises `vlp_bpt.SettingsError` for a wrong value.
+
+    Without a number of threads of its own, the render takes the one of Blender's (`blender -t`).
+    """
+    values = {field.name: getattr(scene.vlp_bpt, field.name) for field in fields(RenderSettings)}
+    if values["threads"] == 0 and scene.render.threads_mode == "FIXED":
+        values["threads"] = scene.render.threads
+    return RenderSettings.from_dict(values)

@@ -18,9 +18,9 @@ def export_world(world: Any, notes: Notes) -> World:
     if world.node_tree is None or (bpy.app.version < (5, 0, 0) and not world.use_nodes):
         return World(world.name, tuple(world.color))
     graph = Graph(world, "World", notes)
-    if graph.output("ShaderNodeOutputWorld", "Volume") is not None:
+    if graph.output("Volume") is not None:
         notes.warn(f"{graph.owner}: volumes are not there yet")
-    place = graph.output("ShaderNodeOutputWorld", "Surface")
+    place = graph.output("Surface")
     if place is None:
         return World(world.name)
     if place.socket.type != "SHADER":
