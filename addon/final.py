@@ -6,6 +6,7 @@ a blank file and the exit code of success.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 import traceback
@@ -14,7 +15,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import core, statistics
+from . import core
 
 # Showing the picture costs up to a second at 4K: this share of the time at most goes into it.
 SHARE_OF_SHOWING = 0.1
@@ -43,10 +44,8 @@ def explain(error: Exception) -> str:
     from .export.notes import ExportError
 
     expected: tuple[type[Exception], ...] = (core.CoreMissing, ExportError)
-    try:
+    with contextlib.suppress(core.CoreMissing):
         expected += (core.load("vlp_bpt.errors").Error,)
-    except core.CoreMissing:
-        pass
     if isinstance(error, expected):
         return f"VLP-BPT: {error}"
     traceback.print_exception(error)
@@ -167,10 +166,10 @@ class _Watcher:
         self._warnings = f" | {warnings} warning{'s' if warnings > 1 else ''}" if warnings else ""
 
     def __call__(self, progress: Any) -> None:
-        figures = self._renderer.statistics
+        taken = self._renderer.statistics
         self._engine.update_progress((self._layer + progress.fraction) / self._layers)
-        self._engine.update_stats("", statistics.status(figures, progress) + self._warnings)
-        megabytes = figures.memory_bytes / 2**20
+        self._engine.update_stats("", figures.status(taken, progress) + self._warnings)
+        megabytes = taken.memory_bytes / 2**20
         self._engine.update_memory_stats(memory_used=megabytes, memory_peak=megabytes)
         if progress.picture and self._picture.due():
             self._picture.show(self._renderer)
@@ -200,16 +199,16 @@ def _report(engine: Any, depsgraph: Any, warnings: list[str]) -> None:
 
 def _record(engine: Any, depsgraph: Any, renderer: Any, seconds: float, warnings: list[str]) -> None:
     """Keeps the statistics for the panel, and stamps them into the result for the files that are written from it."""
-    figures = renderer.statistics
+    taken = renderer.statistics
     layer = depsgraph.view_layer.name
-    statistics.last[(depsgraph.scene.name, layer)] = statistics.lines(figures, seconds, warnings)
+    figures.last[(depsgraph.scene.name, layer)] = figures.lines(taken, seconds, warnings)
     result = engine.get_result()
     if result is None:
         return
     stamps = {
-        "render_time": statistics.duration(figures.seconds),
-        "total_time": statistics.duration(seconds),
-        "iterations": str(figures.iterations),
+        "render_time": figures.duration(taken.seconds),
+        "total_time": figures.duration(seconds),
+        "iterations": str(taken.iterations),
         "settings": json.dumps(renderer.metadata()["settings"]),
         "version": core.load().__version__,
     }

@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+
 from vlp_bpt.scene import Camera, Float32, Projection
 
 from .notes import ExportError, Notes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,17 +11,20 @@ import numpy as np
 if TYPE_CHECKING:
     from .nodes import Graph, Place
 
-Color = tuple[float, ...]
+Color = tuple[float, float, float]
 Value = float | Color
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec. 709
 
 
-def convert(value: Value, kind: str) -> Value:
-    """A value as a socket of type `kind` takes it: colours to numbers by luminance, vectors to colours as they are."""
-    if kind in ("RGBA", "VECTOR"):
-        return value if isinstance(value, tuple) else (value,) * 3
+def as_number(value: Value) -> float:
+    """A value as a number: a colour by its luminance."""
     return sum(a * b for a, b in zip(value, LUMINANCE, strict=True)) if isinstance(value, tuple) else value
+
+
+def as_color(value: Value) -> Color:
+    """A value as a colour or vector."""
+    return value if isinstance(value, tuple) else (value, value, value)
 
 
 def _number(graph: Graph, place: Place, identifier: str) -> float:
@@ -30,6 +33,11 @@ def _number(graph: Graph, place: Place, identifier: str) -> float:
 
 def _color(graph: Graph, place: Place, identifier: str) -> Color:
     return graph.color(place.input(identifier))
+
+
+def _triple(values: Iterable[float]) -> Color:
+    red, green, blue = values
+    return red, green, blue
 
 
 def _own(graph: Graph, place: Place) -> Value:
@@ -77,8 +85,8 @@ def _blend(kind: str, factor: float, a: Color, b: Color, clamp: bool) -> Color |
     blend = _BLEND.get(kind)
     if blend is None:
         return None
-    mixed = tuple(x + factor * (blend(x, y) - x) for x, y in zip(a, b, strict=True))
-    return tuple(min(max(x, 0.0), 1.0) for x in mixed) if clamp else mixed
+    mixed = (x + factor * (blend(x, y) - x) for x, y in zip(a, b, strict=True))
+    return _triple(min(max(x, 0.0), 1.0) if clamp else x for x in mixed)
 
 
 def _mix(graph: Graph, place: Place) -> Value | None:
@@ -89,43 +97,44 @@ def _mix(graph: Graph, place: Place) -> Value | None:
     if node.clamp_factor:
         factor = min(max(factor, 0.0), 1.0)
     if node.data_type == "FLOAT":
-        a, b = (_number(graph, place, name) for name in ("A_Float", "B_Float"))
-        return a + factor * (b - a)
+        start, end = (_number(graph, place, name) for name in ("A_Float", "B_Float"))
+        return start + factor * (end - start)
     suffix = {"RGBA": "Color", "VECTOR": "Vector"}.get(node.data_type)
     if suffix is None:
         return None
-    colors = [_color(graph, place, f"{name}_{suffix}") for name in ("A", "B")]
-    is_color = suffix == "Color"
-    return _blend(node.blend_type if is_color else "MIX", factor, *colors, clamp=is_color and node.clamp_result)
+    a, b = (_color(graph, place, f"{name}_{suffix}") for name in ("A", "B"))
+    if suffix == "Vector":
+        return _blend("MIX", factor, a, b, clamp=False)
+    return _blend(node.blend_type, factor, a, b, clamp=node.clamp_result)
 
 
 def _mix_rgb(graph: Graph, place: Place) -> Value | None:
     node = place.node
     factor = min(max(_number(graph, place, "Fac"), 0.0), 1.0)
-    colors = [_color(graph, place, name) for name in ("Color1", "Color2")]
-    return _blend(node.blend_type, factor, *colors, clamp=node.use_clamp)
+    a, b = (_color(graph, place, name) for name in ("Color1", "Color2"))
+    return _blend(node.blend_type, factor, a, b, clamp=node.use_clamp)
 
 
 def _gamma(graph: Graph, place: Place) -> Value:
     gamma = _number(graph, place, "Gamma")
-    return tuple(x**gamma if x > 0 else x for x in _color(graph, place, "Color"))
+    return _triple(x**gamma if x > 0 else x for x in _color(graph, place, "Color"))
 
 
 def _invert(graph: Graph, place: Place) -> Value:
     factor = _number(graph, place, "Fac")
-    return tuple(x + factor * (1.0 - 2.0 * x) for x in _color(graph, place, "Color"))
+    return _triple(x + factor * (1.0 - 2.0 * x) for x in _color(graph, place, "Color"))
 
 
 def _ramp(graph: Graph, place: Place) -> Value:
     color = place.node.color_ramp.evaluate(_number(graph, place, "Fac"))
-    return color[3] if place.socket.identifier == "Alpha" else tuple(color[:3])
+    return color[3] if place.socket.identifier == "Alpha" else _triple(color[:3])
 
 
 def _combine(graph: Graph, place: Place) -> Value | None:
     if getattr(place.node, "mode", "RGB") != "RGB":
         return None
     names = ("X", "Y", "Z") if place.node.bl_idname == "ShaderNodeCombineXYZ" else ("Red", "Green", "Blue")
-    return tuple(_number(graph, place, name) for name in names)
+    return _triple(_number(graph, place, name) for name in names)
 
 
 def _image(graph: Graph, place: Place) -> Value | None:
@@ -146,7 +155,7 @@ def _image(graph: Graph, place: Place) -> Value | None:
     color = mean[:3] if image.channels >= 3 else np.repeat(mean[:1], 3)
     if not image.is_float and image.colorspace_settings.name == "sRGB":
         color = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
-    return tuple(float(x) for x in color)
+    return _triple(float(x) for x in color)
 
 
 FOLDABLE: dict[str, Callable[[Graph, Place], Value | None]] = {
@@ -160,6 +169,6 @@ FOLDABLE: dict[str, Callable[[Graph, Place], Value | None]] = {
     "ShaderNodeValToRGB": _ramp,
     "ShaderNodeCombineColor": _combine,
     "ShaderNodeCombineXYZ": _combine,
-    "ShaderNodeRGBToBW": lambda graph, place: convert(_color(graph, place, "Color"), "VALUE"),
+    "ShaderNodeRGBToBW": lambda graph, place: as_number(_color(graph, place, "Color")),
     "ShaderNodeTexImage": _image,
 }

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+
 from vlp_bpt.scene import AreaLight, Float32, Light, PointLight, Rgb, SpotLight, SunLight, Visibility
 
 from .camera import rigid

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import bpy
+
 from vlp_bpt import materials
 from vlp_bpt.scene import Material
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+
 from vlp_bpt.scene import Float32, Int32, Mesh
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import bpy
 
-from .constants import FOLDABLE, Value, convert
+from .constants import FOLDABLE, Color, Value, as_color, as_number
 from .notes import Notes
 
 # Nodes that a link passes straight through are followed at most this often: a tree that loops ends.
@@ -59,32 +59,28 @@ class Graph:
         found = self._follow(place)
         return found if found.socket.is_output else None
 
-    def value(self, place: Place) -> Value:
-        """The constant at an input, as its own socket's type: folded where the nodes before it are constant.
-
-        What is not constant is replaced by its nearest constant and reported once.
-        """
-        found = self._follow(place)
-        kind = place.socket.type
-        if not found.socket.is_output:
-            return convert(own_value(found.socket), kind)
-        node = found.node
-        fold = FOLDABLE.get(node.bl_idname)
-        result = fold(self, found) if fold else None
-        if result is None:
-            self.notes.warn(f"{self.owner}: {label(node)} is not there yet, a constant stands in for it")
-            return convert(own_value(place.socket), kind)
-        return convert(result, kind)
-
     def number(self, place: Place | None, default: float = 0.0) -> float:
         """The constant at an input as a number; `default` where the node has no such input."""
-        return default if place is None else float(convert(self.value(place), "VALUE"))  # type: ignore[arg-type]
+        return default if place is None else as_number(self._value(place))
 
-    def color(self, place: Place | None, default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[float, ...]:
+    def color(self, place: Place | None, default: Color = (0.0, 0.0, 0.0)) -> Color:
         """The constant at an input as a colour; `default` where the node has no such input."""
-        if place is None:
-            return default
-        return convert(self.value(place), "RGBA")  # type: ignore[return-value]
+        return default if place is None else as_color(self._value(place))
+
+    def _value(self, place: Place) -> Value:
+        """The constant at a socket: its own, or folded where the nodes before it are constant.
+
+        What is not constant is replaced by its nearest constant, the socket's own, and reported once.
+        """
+        found = self._follow(place)
+        if not found.socket.is_output:
+            return own_value(found.socket)
+        fold = FOLDABLE.get(found.node.bl_idname)
+        value = fold(self, found) if fold else None
+        if value is None:
+            self.notes.warn(f"{self.owner}: {label(found.node)} is not there yet, a constant stands in for it")
+            return own_value(place.socket)
+        return value
 
     def _follow(self, place: Place) -> Place:
         """From an input to what feeds it: an output of a node that does something, or an input with its own value."""
@@ -149,7 +145,7 @@ def own_value(socket: Any) -> Value:
     value = getattr(socket, "default_value", None)
     if value is None or isinstance(value, str):
         return 0.0
-    return tuple(value[:3]) if hasattr(value, "__len__") else float(value)
+    return (value[0], value[1], value[2]) if hasattr(value, "__len__") else float(value)
 
 
 def label(node: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from vlp_bpt.scene import Spheres
 
 DEFAULT_RADIUS = 0.01  # metres: what Blender draws for points without a radius

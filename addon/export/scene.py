@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+
 from vlp_bpt.scene import Film, Float32, Instance, Mesh, Scene, Spheres, Visibility
 
 from .camera import export_camera

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+
 from vlp_bpt.scene import World
 
 from .nodes import Graph, label

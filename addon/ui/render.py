@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from .. import statistics
+from .. import figures
 from .reuse import ENGINE_ID
 
 
@@ -84,7 +84,7 @@ class VLP_BPT_PT_statistics(_RenderPanel, bpy.types.Panel):
 
     def draw(self, context: Any) -> None:
         layout = self.layout
-        shown = {layer: rows for (scene, layer), rows in statistics.last.items() if scene == context.scene.name}
+        shown = {layer: rows for (scene, layer), rows in figures.last.items() if scene == context.scene.name}
         if not shown:
             layout.label(text="Nothing was rendered yet")
         for layer, rows in shown.items():
@@ -118,4 +118,4 @@ def register() -> None:
 def unregister() -> None:
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
-    statistics.last.clear()
+    figures.last.clear()
