@@ -15,7 +15,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import core
+from . import core, figures
 
 # Showing the picture costs up to a second at 4K: this share of the time at most goes into it.
 SHARE_OF_SHOWING = 0.1
