@@ -126,8 +126,7 @@ void bind_scene(nb::module_& m) {
                                   layered_under.data()[i],
                                   compensate.data()[i] != 0};
                  }
-                 const BuiltMaterial built = build_material(inputs, rgb_of(emission));
-                 return s.add_material(built.material, built.lobes);
+                 return s.add_material(inputs, rgb_of(emission));
              })
         .def("add_instance",
              [](Scene& s, uint32_t geometry, FloatMatrix transform, Ints1 materials, uint32_t visibility) {

@@ -1,7 +1,7 @@
 // The eye pass (the paper's Listing 3): a path from a pixel gathers from lights and from virtual light points.
 #pragma once
 
-#include "camera/sample_camera.h"
+#include "camera/projection.h"
 #include "integrator/light_density.h"
 #include "integrator/virtual_light_points.h"
 
@@ -47,8 +47,8 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
     found.position = is_infinite(light) ? event.direction : event.position;
     found.normal = event.normal;
     const float cos_x_1 = abs_dot(eye.surface.geometric_normal, event.direction);
-    const Rgb f = eval(bsdf, eye.w_eye, event.direction);
-    if (!(cos_x_1 > 0) || is_black(f)) return found;
+    const LobeValue at_x_1 = evaluate(bsdf, eye.w_eye, event.direction);
+    if (!(cos_x_1 > 0) || is_black(at_x_1.f)) return found;
 
     const Anchor from = anchor_of(eye.surface);
     const Rgb through =
@@ -57,20 +57,19 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
             : transmittance(scene, from, Anchor{event.position, event.normal, event.surface}, event.direction);
     if (is_black(through)) return found;
     const float pdf_next_event = choice.pdf * event.pdf_solid_angle;
-    found.value = eye.throughput * f * event.radiance * through * (cos_x_1 / pdf_next_event);
+    found.value = eye.throughput * at_x_1.f * event.radiance * through * (cos_x_1 / pdf_next_event);
 
     const uint32_t n = eye.t + 1;
     const float dist_squared = event.distance * event.distance;
     StrategySum sum = strategy_sum(pass, 1);
     if (!event.delta && n <= pass.eye_path_length + 1) {
-        sum.add(pdf(bsdf, eye.w_eye, event.direction) / pdf_next_event, strategy_count(pass, 0));
+        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0));
     }
     if (pass.light_path_length > 0 && eye.t > 2) {
         const LightEnd end =
             light_end(scene, choice.index, x_1, event.position, event.normal, event.direction, dist_squared);
         const float ratio = end.pdf_emission / end.pdf_next_event * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
-        const float next_ratio = pdf(bsdf, event.direction, eye.w_eye) * eye.last().rev_geometry;
-        add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, next_ratio);
+        add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, at_x_1.pdf_eye * eye.last().rev_geometry);
     }
     found.weight = sum.weight();
     return found;
@@ -111,11 +110,11 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         const Rgb throughput = eye.throughput * step.throughput;
         if (!step.found) {
             if (from_camera && pass.transparent_film) return 0;
-            for (uint32_t i = 0; i < scene.infinite_light_count; ++i) {
-                const uint32_t light = scene.infinite_lights[i];
-                if (from_camera && !(scene.lights[light].visibility & k_visible_to_camera)) continue;
-                sink.add(hit_light(scene, pass, eye, throughput, pdf_solid_angle, light, {}, -ray.direction, ray.direction));
-            }
+            for_each_infinite_light(scene, ray.direction, [&](uint32_t light) {
+                if (from_camera && !(scene.lights[light].visibility & k_visible_to_camera)) return;
+                sink.add(
+                    hit_light(scene, pass, eye, throughput, pdf_solid_angle, light, {}, -ray.direction, ray.direction));
+            });
             break;
         }
         const SurfacePoint& z = step.surface;

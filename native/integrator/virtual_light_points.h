@@ -23,10 +23,10 @@ struct EyeWalk {
 // does not hold.
 struct Contribution {
     uint32_t s = 0, t = 0;
-    Rgb value;
+    Rgb value{};
     float weight = 0;
     uint32_t light = k_none;           // s < 2: the light, and the point y_0 (the direction to it where it is infinite)
-    Vec3 position, normal;
+    Vec3 position{}, normal{};
     const LightVertex* vlp = nullptr;  // s >= 2: y_{s-1}
 };
 
@@ -41,21 +41,17 @@ VLP_HD inline SurfacePoint surface_of(const LightVertex& vlp) {
     return p;
 }
 
-// The weight of joining z_{t-1} (scattering by `eye_bsdf`) to a VLP; `edge` runs from the eye vertex to the VLP.
-VLP_HD inline float connection_weight(const PassSettings& pass, const EyeWalk& eye, const Bsdf& eye_bsdf,
-                                      const LightVertex* vlp, const Bsdf& vlp_bsdf, Vec3 to_previous, const Edge& edge,
-                                      float cos_eye, float cos_vlp) {
+// The weight of joining z_{t-1} to a VLP by `edge`, which runs from the eye vertex; both BSDFs as evaluated along it.
+VLP_HD inline float connection_weight(const PassSettings& pass, const EyeWalk& eye, const LobeValue& at_eye,
+                                      const LightVertex* vlp, const LobeValue& at_vlp, const Edge& edge, float cos_eye,
+                                      float cos_vlp) {
     const uint32_t s = vlp->index() + 1, n = s + eye.t;
     StrategySum sum = strategy_sum(pass, s);
-    if (s < pass.light_path_length + 1 && eye.t > 2) {
-        const float light_pdf = pdf(vlp_bsdf, to_previous, -edge.direction) * cos_eye / edge.dist_squared;
-        const float ratio = light_pdf / eye.last().pdf_area;
-        const float next_ratio = pdf(eye_bsdf, edge.direction, eye.w_eye) * eye.last().rev_geometry;
-        add_longer_light_walks(sum, pass, eye.vertices, n, s + 1, ratio, next_ratio);
-    }
-    const float eye_pdf = pdf(eye_bsdf, eye.w_eye, edge.direction) * cos_vlp / edge.dist_squared;
-    const float next_ratio = pdf(vlp_bsdf, -edge.direction, to_previous) * vlp->rev_geometry;
-    add_shorter_light_walks(sum, pass, vlp, s, n, eye_pdf / vlp->pdf_area, next_ratio);
+    const float light_pdf = at_vlp.pdf_eye * cos_eye / edge.dist_squared;
+    add_longer_light_walks(sum, pass, eye.vertices, n, s + 1, light_pdf / eye.last().pdf_area,
+                           at_eye.pdf_eye * eye.last().rev_geometry);
+    const float eye_pdf = at_eye.pdf_light * cos_vlp / edge.dist_squared;
+    add_shorter_light_walks(sum, pass, vlp, s, n, eye_pdf / vlp->pdf_area, at_vlp.pdf_light * vlp->rev_geometry);
     return sum.weight();
 }
 
@@ -74,18 +70,16 @@ VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, c
     const float geometry = cos_eye * cos_vlp / edge.dist_squared;
     if (!(geometry > 0) || !is_finite(geometry)) return found;
 
-    const Rgb f_eye = eval(eye_bsdf, eye.w_eye, edge.direction);
-    if (is_black(f_eye)) return found;
-    const Bsdf vlp_bsdf = make_bsdf(scene, point);
-    const Vec3 to_previous = decode(vlp->to_previous);
-    const Rgb f_vlp = eval(vlp_bsdf, -edge.direction, to_previous);
-    if (is_black(f_vlp)) return found;
+    const LobeValue at_eye = evaluate(eye_bsdf, eye.w_eye, edge.direction);
+    if (is_black(at_eye.f)) return found;
+    const LobeValue at_vlp = evaluate(make_bsdf(scene, point), -edge.direction, decode(vlp->to_previous));
+    if (is_black(at_vlp.f)) return found;
 
     const Rgb through = transmittance(scene, anchor_of(eye.surface), anchor_of(point), edge.direction);
     if (is_black(through)) return found;
     const float vlps_per_path = static_cast<float>(cache.stored_count) / static_cast<float>(pass.light_paths);
-    found.value = eye.throughput * f_eye * f_vlp * vlp->throughput * through * (geometry * vlps_per_path);
-    found.weight = connection_weight(pass, eye, eye_bsdf, vlp, vlp_bsdf, to_previous, edge, cos_eye, cos_vlp);
+    found.value = eye.throughput * at_eye.f * at_vlp.f * vlp->throughput * through * (geometry * vlps_per_path);
+    found.weight = connection_weight(pass, eye, at_eye, vlp, at_vlp, edge, cos_eye, cos_vlp);
     return found;
 }
 

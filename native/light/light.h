@@ -164,14 +164,14 @@ VLP_HD inline void for_each_lamp_hit(const SceneView& scene, const Ray& ray, F&&
     }
 }
 
-// Calls f(light_index) for every infinite light that an escaping ray in `direction` may see: suns with an angle and the
-// environment. What it sees of one is emitted(..., -direction).
+// Calls f(light_index) for every infinite light that an escaping ray in `direction` may see: the environment and suns with
+// an angle. What it sees of one is emitted(..., -direction).
 template <typename F>
 VLP_HD inline void for_each_infinite_light(const SceneView& scene, Vec3 direction, F&& f) {
-    if (scene.world_light != k_none) f(scene.world_light);
-    for (uint32_t i = 0; i < scene.lamps.count; ++i) {
-        const uint32_t index = scene.lamps.lights[i];
-        if (scene.lights[index].kind == LightKind::sun && sun_contains(scene.lights[index], -direction)) f(index);
+    for (uint32_t i = 0; i < scene.infinite_light_count; ++i) {
+        const uint32_t index = scene.infinite_lights[i];
+        const Light& light = scene.lights[index];
+        if (light.kind != LightKind::sun || sun_contains(light, -direction)) f(index);
     }
 }
 
