@@ -51,9 +51,12 @@ struct Fit {
     double seen = 0;      // share of draws that were valid
 };
 
+// What integrating the density by points may miss: all of a cell's corner that it just reaches, and in total.
+inline constexpr double k_sliver = 1e-4, k_integral_error = 0.01;
+
 // `draw(point)` fills a point of the unit hypercube and says whether the draw was valid; `density(point)` is per unit
 // volume of it. Cells expected to hold fewer than 10 draws are pooled; invalid draws are a cell of their own, which the
-// density expects to hold what it lacks to 1. A draw where the density is 0 gives p = 0.
+// density expects to hold what it lacks to 1. Draws where the density is 0 give p = 0.
 template <int N, typename Draw, typename Density>
 Fit goodness_of_fit(const int (&cells)[N], uint64_t draws, int subdivision, Random& random, Draw&& draw, Density&& density) {
     size_t cell_count = 1;
@@ -101,13 +104,13 @@ Fit goodness_of_fit(const int (&cells)[N], uint64_t draws, int subdivision, Rand
         if (e >= 10) {
             add(e, seen[i]);
         } else {
-            if (e == 0 && seen[i] > 1e-5 * total) return fit;  // a few may fall over an edge by rounding
+            if (e == 0 && seen[i] > k_sliver * total) return fit;
             pooled_expected += e;
             pooled_seen += seen[i];
         }
     }
     const double missing = total * (1 - fit.expected);
-    if (missing >= 10) add(missing, total - static_cast<double>(valid));
+    if (missing >= k_integral_error * total) add(missing, total - static_cast<double>(valid));
     if (pooled_expected >= 10) add(pooled_expected, pooled_seen);
     fit.p = freedom > 0 ? chi_squared_tail(statistic, freedom) : 1;
     return fit;

@@ -34,8 +34,10 @@ struct LightScene {
     const SceneView& scene() {
         view.lights = &light;
         view.light_count = 1;
-        view.world_light = light.kind == LightKind::environment ? 0 : k_none;
-        view.lamps = {&index, light.kind == LightKind::triangle || light.kind == LightKind::sphere ? 0u : 1u};
+        const bool listed = !is_delta(light) && !is_surface(light);
+        view.infinite_lights = &index;
+        view.infinite_light_count = listed && is_infinite(light) ? 1 : 0;
+        view.lamps = {&index, listed && !is_infinite(light) ? 1u : 0u};
         return view;
     }
 };
@@ -101,11 +103,15 @@ inline LightHit hit_light(LightScene& s, const Ray& ray) {
         hit.position = ray.origin + hit.t * ray.direction;
         hit.normal = emission_normal(light, hit.position, -ray.direction);
     } else if (light.kind == LightKind::sphere) {
-        const Vec3 c = ray.origin - light.position;
-        const float b = dot(c, ray.direction), root = b * b - dot(c, c) + square(light.radius);
+        // In double: the textbook formula loses too many digits from afar.
+        const Vec3 c = ray.origin - light.position, d = ray.direction;
+        const double dd = double{d.x} * d.x + double{d.y} * d.y + double{d.z} * d.z;
+        const double b = (double{c.x} * d.x + double{c.y} * d.y + double{c.z} * d.z) / dd;
+        const double cc = (double{c.x} * c.x + double{c.y} * c.y + double{c.z} * c.z) / dd;
+        const double root = b * b - cc + double{light.radius} * light.radius / dd;
         if (root < 0) return hit;
-        const float near = -b - std::sqrt(root), far = -b + std::sqrt(root);
-        hit.t = near > 0 ? near : far;
+        const double near = -b - std::sqrt(root), far = -b + std::sqrt(root);
+        hit.t = static_cast<float>(near > 0 ? near : far);
         hit.found = hit.t > 0;
         hit.position = ray.origin + hit.t * ray.direction;
         hit.normal = emission_normal(light, hit.position, -ray.direction);
