@@ -1,9 +1,21 @@
-# Finds a CUDA compiler and builds backend/*.cu as the object library vlp_cuda; sets VLP_HAS_CUDA.
+# Finds a CUDA compiler and builds backend/*.cu as the library vlp_cuda; sets VLP_HAS_CUDA.
 set(VLP_HAS_CUDA FALSE)
 if(VLP_CUDA STREQUAL "OFF")
   return()
 endif()
 set(VLP_CUDA_ROOT "" CACHE PATH "CUDA toolkit to use; empty: CUDA_HOME, PATH, then the PyPI packages nvidia-cuda-* beside Python")
+
+# The release makes the library once and links it into the modules of each Python.
+set(VLP_CUDA_LIBRARY "" CACHE FILEPATH "A libvlp_cuda.a that was built before, to be used instead of compiling")
+if(VLP_CUDA_LIBRARY)
+  set(CUDAToolkit_ROOT ${VLP_CUDA_ROOT})
+  find_package(CUDAToolkit REQUIRED)
+  add_library(vlp_cuda STATIC IMPORTED)
+  set_target_properties(vlp_cuda PROPERTIES IMPORTED_LOCATION ${VLP_CUDA_LIBRARY})
+  target_link_libraries(vlp_cuda INTERFACE CUDA::cudart_static)
+  set(VLP_HAS_CUDA TRUE)
+  return()
+endif()
 
 if(NOT CMAKE_CUDA_COMPILER)
   find_program(CMAKE_CUDA_COMPILER nvcc HINTS ${VLP_CUDA_ROOT} ENV CUDA_HOME PATHS ${Python_SITELIB}/nvidia/cu13 PATH_SUFFIXES bin)
@@ -30,8 +42,8 @@ find_package(CUDAToolkit REQUIRED)
 
 # Compiled once for all instruction sets: what crosses this border must not depend on one.
 file(GLOB cuda_sources CONFIGURE_DEPENDS backend/*.cu)
-add_library(vlp_cuda OBJECT ${cuda_sources})
-target_compile_options(vlp_cuda PRIVATE --expt-relaxed-constexpr --extended-lambda -lineinfo -Xcompiler=-fno-math-errno,-Wall
+add_library(vlp_cuda STATIC ${cuda_sources})
+target_compile_options(vlp_cuda PRIVATE --expt-relaxed-constexpr --extended-lambda -lineinfo --threads=0 -Xcompiler=-fno-math-errno,-Wall
   $<$<BOOL:${VLP_WERROR}>:-Werror=all-warnings>)
 target_link_libraries(vlp_cuda PUBLIC vlp_options CUDA::cudart_static)
 set(VLP_HAS_CUDA TRUE)

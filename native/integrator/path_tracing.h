@@ -1,7 +1,7 @@
 // The eye pass (the paper's Listing 3): a path from a pixel gathers from lights and from virtual light points.
 #pragma once
 
-#include "camera/sample_camera.h"
+#include "camera/projection.h"
 #include "integrator/light_density.h"
 #include "integrator/virtual_light_points.h"
 
@@ -110,11 +110,11 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         const Rgb throughput = eye.throughput * step.throughput;
         if (!step.found) {
             if (from_camera && pass.transparent_film) return 0;
-            for (uint32_t i = 0; i < scene.infinite_light_count; ++i) {
-                const uint32_t light = scene.infinite_lights[i];
-                if (from_camera && !(scene.lights[light].visibility & k_visible_to_camera)) continue;
-                sink.add(hit_light(scene, pass, eye, throughput, pdf_solid_angle, light, {}, -ray.direction, ray.direction));
-            }
+            for_each_infinite_light(scene, ray.direction, [&](uint32_t light) {
+                if (from_camera && !(scene.lights[light].visibility & k_visible_to_camera)) return;
+                sink.add(
+                    hit_light(scene, pass, eye, throughput, pdf_solid_angle, light, {}, -ray.direction, ray.direction));
+            });
             break;
         }
         const SurfacePoint& z = step.surface;

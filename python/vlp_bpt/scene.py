@@ -36,10 +36,11 @@ class LobeKind(IntEnum):
 class Fresnel(IntEnum):
     """The Fresnel term of a REFLECTION lobe; the same numbers as `Fresnel` in native/scene/material.h."""
 
-    NONE = 0  # reflects `weight` in every direction (Blender's Glossy BSDF)
-    DIELECTRIC = 1  # unpolarised dielectric of index `ior`
+    NONE = 0  # reflects `f0` at every angle (Blender's Glossy BSDF)
+    DIELECTRIC = 1  # unpolarised dielectric of index `ior`, its reflection tinted by `f0`
     SCHLICK = 2  # `f0` at normal incidence, `f82` tint near 82 degrees (Principled metal)
     CONDUCTOR = 3  # complex index: `f0` holds eta and `f82` holds k, per channel
+    TINTED_DIELECTRIC = 4  # as DIELECTRIC, but `f0` tints normal incidence alone (Principled's specular tint)
 
 
 class Visibility(IntFlag):
@@ -53,7 +54,10 @@ class Visibility(IntFlag):
 class Lobe:
     """One scattering lobe of a material.
 
-    `roughness` is Blender's: alpha = roughness**2; below 1e-3 the lobe is specular (a delta distribution).
+    `weight` scales the whole lobe; its own colours are `f0` and `f82` (see `Fresnel`), so that mixing leaves them be.
+    A DIELECTRIC lobe has a DIELECTRIC or TINTED_DIELECTRIC term (NONE is read as DIELECTRIC), and `f82` tints what it
+    refracts; so does the `f82` of a REFRACTION.
+    `roughness` is Blender's: alpha = roughness**2; below 0.0038 the lobe is specular (a delta distribution).
     `layered_under` names the index, in the material's tuple, of the lobe that lies above this one: its light is
     reduced by what that lobe reflects (Principled's diffuse base under its specular layer), -1 for none.
     `compensate` adds back the energy that single-scattering GGX loses (Blender's MULTI_GGX).
