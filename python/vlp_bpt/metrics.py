@@ -196,7 +196,7 @@ def _feature_difference(x: Float64, r: Float64, pixels_per_degree: float) -> Flo
 def _signed_unit(kernel: Float64) -> Float64:
     """The kernel with its positive weights summing to 1 and its negative ones to -1."""
     positive, negative = kernel[kernel > 0].sum(), -kernel[kernel < 0].sum()
-    return np.where(kernel > 0, kernel / positive, kernel / negative)
+    return np.asarray(np.where(kernel > 0, kernel / positive, kernel / negative))
 
 
 def _rgb_to_xyz() -> Float64:
