@@ -26,6 +26,12 @@ PYTEST_ARGS ?=
 CXX_FILES = $(shell find native tests/native -name '*.cpp' -o -name '*.h' -o -name '*.cu' | sort)
 NATIVE := $(shell find native -type f -not -name '*.md' 2>/dev/null) pyproject.toml
 
+# Changes when the settings do, so that the next build takes them up.
+SETTINGS := $(VLP_CUDA) $(VLP_CUDA_ARCHITECTURES) $(CMAKE_DEFINES)
+ifneq ($(SETTINGS),$(file <build/settings))
+$(shell mkdir -p build)$(file >build/settings,$(SETTINGS))
+endif
+
 .PHONY: demo
 demo: build ## render scenes/cornell_box.blend through Blender and the add-on to out/cornell_box.png
 	@mkdir -p out
@@ -43,7 +49,7 @@ test-native: build
 
 .PHONY: test-python
 test-python: build
-	$(PY) -m pytest tests $(PYTEST_ARGS)
+	$(PY) -m pytest tests --ignore=tests/blender --ignore=tests/gpu $(PYTEST_ARGS)
 
 # Blender 4.5's Python. Where it is missing, only a developer's machine may go without it.
 .PHONY: test-python311
@@ -62,7 +68,7 @@ bench: build ## speed and error over time, beside Cycles
 
 .PHONY: extension
 extension: wheel ## dist/vlp_bpt-VERSION-PLATFORM.zip, to be installed in Blender
-	$(PY) addon/build_extension.py --wheels dist/wheels --output dist
+	$(PY) addon/build_extension.py dist/vlp_bpt-$(VERSION)-cp311-abi3-*.whl --output dist
 
 .PHONY: build
 build: .venv/.native ## compile the native core and install the package in .venv (editable)
@@ -77,11 +83,11 @@ format: .venv/.lint ## format C++, CUDA and Python
 	@$(BIN)/ruff format .
 
 .PHONY: lint
-lint: lint-format lint-python typecheck lint-native ## formatting, ruff, mypy, stubs, clang-tidy
+lint: lint-format lint-python typecheck lint-native ## formatting, ruff, mypy, clang-tidy
 
 .PHONY: lint-format
 lint-format: .venv/.lint
-	$(BIN)/clang-format --dry-run -Werror $(CXX_FILES)
+	@echo clang-format --dry-run; $(BIN)/clang-format --dry-run -Werror $(CXX_FILES)
 	$(BIN)/ruff format --check .
 
 .PHONY: lint-python
@@ -89,13 +95,12 @@ lint-python: .venv/.lint
 	$(BIN)/ruff check .
 
 .PHONY: typecheck
-typecheck: build .venv/.lint ## mypy, and _native.pyi against the compiled module
+typecheck: .venv/.lint ## mypy
 	$(BIN)/mypy
-	$(BIN)/stubtest vlp_bpt._native --mypy-config-file pyproject.toml
 
 # clang-tidy reads one variant's compile commands, in a build directory that never compiles.
 .PHONY: lint-native
-lint-native: build .venv/.lint
+lint-native: .venv/.lint
 	@PATH=$(BIN):$$PATH cmake -S native -B build/tidy -G Ninja -DVLP_CUDA=OFF -DVLP_ISA_VARIANTS=$(TIDY_ISA) -DPython_EXECUTABLE=$(CURDIR)/$(PY) \
 	  -DCMAKE_BUILD_TYPE=Debug >build/tidy.log || { cat build/tidy.log >&2; exit 1; }
 	find native -name '*.cpp' -not -path '*/bench/*' | sort | \
@@ -108,8 +113,13 @@ stubs: build .venv/.lint ## write python/vlp_bpt/_native.pyi from the compiled m
 
 # Wheels carry GPU code made with the PyPI toolchain, whatever CUDA the machine has; WHEEL_CUDA=OFF leaves it out.
 .PHONY: wheel
-wheel: .venv/.wheel .venv311/.ready .ci/wheel.sh ## dist/wheels: one wheel for Python 3.11, one for 3.12 and later
-	@root=$(if $(filter OFF,$(WHEEL_CUDA)),,$$(.ci/cuda.sh)); CUDA_ROOT=$$root ARCHITECTURES="$(WHEEL_CUDA_ARCHITECTURES)" .ci/wheel.sh .venv .venv311
+wheel: .venv/.wheel .venv311/.ready .ci/wheel.sh ## dist/*.whl: the package for Python 3.11 and every later one
+	@root=$(if $(filter OFF,$(WHEEL_CUDA)),,$$(.ci/cuda.sh)); CUDA_ROOT=$$root ARCHITECTURES="$(WHEEL_CUDA_ARCHITECTURES)" .ci/wheel.sh .venv311 .venv
+
+.PHONY: sanitize
+sanitize: .venv/.ready ## native tests under the address and undefined-behaviour sanitizers
+	@.ci/system.sh gtest
+	@cd native && export PATH=$(BIN):$$PATH && cmake --preset asan >/dev/null && cmake --build --preset asan && ctest --preset asan
 
 .PHONY: cuda-check
 cuda-check: .venv/.ready ## compile the CUDA code with the PyPI toolchain alone (no GPU needed)
@@ -119,7 +129,7 @@ cuda-check: .venv/.ready ## compile the CUDA code with the PyPI toolchain alone 
 	  cmake --build build/cuda --target vlp_cuda"
 
 .PHONY: gpu-check
-gpu-check: ## on a machine with a GPU, nvcc, cmake, ninja, python3, nanobind, numpy, pytest and nothing else: build, test, bench
+gpu-check: ## build with CUDA and test, on a machine with a GPU and no package registry
 	.ci/gpu-check.sh
 
 ##@ Environments
@@ -143,8 +153,8 @@ gpu-check: ## on a machine with a GPU, nvcc, cmake, ninja, python3, nanobind, nu
 	@touch $@
 
 # An editable install: Python files are used where they lie, the native core is compiled in build/venv* and copied into the environment.
-%/.native: %/.ready $(NATIVE)
-	@.ci/system.sh compiler
+%/.native: %/.ready $(NATIVE) build/settings
+	@.ci/system.sh compiler $*/bin/python
 	@PATH=$(CURDIR)/$*/bin:$$PATH $(UV) pip install --quiet --python $* --no-deps --no-build-isolation \
 	  -C build-dir=build/$(*:.%=%) -C cmake.define.VLP_CUDA=$(VLP_CUDA) -C "cmake.define.VLP_CUDA_ARCHITECTURES=$(VLP_CUDA_ARCHITECTURES)" \
 	  $(foreach d,$(CMAKE_DEFINES),-C cmake.define.$(d)) --editable .

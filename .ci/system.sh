@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# system.sh compiler|gtest|bpy PYTHON: says in one line which system package is missing, or nothing. Run by the Makefile.
+# system.sh compiler PYTHON | gtest | bpy PYTHON: says in one line which system package is missing, or nothing. Run by the Makefile.
 set -euo pipefail
 cxx=${CXX:-c++}
 compiles() { echo "$1" | "$cxx" -std=c++20 -fsyntax-only -x c++ - 2>/dev/null; }
@@ -7,7 +7,9 @@ missing() { echo "vlp-bpt: $1 is missing; on Debian or Ubuntu: apt-get install $
 case $1 in
   compiler) compiles '#include <concepts>
 #include <span>
-static_assert(__cplusplus >= 202002L);' || missing "a C++20 compiler (\$CXX or c++: GCC 11, Clang 14 or later)" g++ ;;
+static_assert(__cplusplus >= 202002L);' || missing "a C++20 compiler (\$CXX or c++: GCC 11, Clang 14 or later)" g++
+    "$2" -c 'import pathlib, sysconfig, sys; sys.exit(not pathlib.Path(sysconfig.get_path("include"), "Python.h").exists())' ||
+      missing "Python.h, which extension modules are compiled with," "$("$2" -c 'import sys; print("python%d.%d-dev" % sys.version_info[:2])')" ;;
   gtest) compiles '#include <gtest/gtest.h>' || missing "GoogleTest" libgtest-dev ;;
   bpy)
     site=$("$2" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')

@@ -1,5 +1,6 @@
 // The CPU back end: both passes as parallel loops over paths and over tiles of pixels.
 #include <algorithm>
+#include <numeric>
 
 #include "backend/backend.h"
 #include "core/parallel.h"
@@ -114,13 +115,8 @@ private:
             counters.work_done.fetch_add(1, std::memory_order_relaxed);
         });
         if (stop) return;
-        uint32_t total = 0;
-        for (uint32_t& count : stored_in_piece_) {
-            const uint32_t begin = total;
-            total += count;
-            count = begin;
-        }
-        stored_in_piece_.back() = total;
+        stored_in_piece_.back() = 0;
+        std::exclusive_scan(stored_in_piece_.begin(), stored_in_piece_.end(), stored_in_piece_.begin(), 0u);
         pool_.run(pieces, [&](uint32_t piece) {
             const uint32_t slots_per_piece = k_paths_per_piece * pass_.light_path_length;
             const uint32_t end = std::min((piece + 1) * slots_per_piece, static_cast<uint32_t>(stored_.size()));

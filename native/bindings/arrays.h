@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstring>
+#include <optional>
 #include <span>
 
 #include "core/rgb.h"
@@ -20,14 +21,15 @@ using Array = nb::ndarray<T, nb::ndim<Dimensions>, nb::c_contig, nb::device::cpu
 using FloatMatrix = nb::ndarray<const float, nb::shape<3, 4>, nb::c_contig, nb::device::cpu>;
 using Triple = std::array<float, 3>;
 
-// The elements of an array as values of T, which packs `sizeof(T) / sizeof(Element)` of them.
-template <typename T, typename Element, size_t Dimensions>
-std::span<const T> span_of(const Array<const Element, Dimensions>& a) {
+// The elements of an array as values of T, which packs several of them; nothing for an array that was not given.
+template <typename T, typename... Options>
+std::span<const T> span_of(const nb::ndarray<Options...>& a) {
+    using Element = typename nb::ndarray<Options...>::Scalar;
     static_assert(sizeof(T) % sizeof(Element) == 0);
     return {reinterpret_cast<const T*>(a.data()), a.size() * sizeof(Element) / sizeof(T)};
 }
-template <typename T, typename Element, size_t Dimensions>
-std::span<const T> span_of(const std::optional<Array<const Element, Dimensions>>& a) {
+template <typename T, typename A>
+std::span<const T> span_of(const std::optional<A>& a) {
     return a ? span_of<T>(*a) : std::span<const T>{};
 }
 

@@ -38,7 +38,7 @@ nb::ndarray<nb::numpy, T, nb::ndim<1>> to_numpy(std::vector<T> values) {
 }
 
 // Directions need not be of unit length: t counts in their length.
-nb::dict intersect(const Scene& scene, Floats2 origins, Floats2 directions, Floats1 t_max) {
+nb::dict intersect_rays(const Scene& scene, Floats2 origins, Floats2 directions, Floats1 t_max) {
     require_built(scene);
     const auto o = span_of<Vec3>(origins), d = span_of<Vec3>(directions);
     const size_t n = o.size();
@@ -60,7 +60,7 @@ nb::dict intersect(const Scene& scene, Floats2 origins, Floats2 directions, Floa
     return result;
 }
 
-nb::ndarray<nb::numpy, uint8_t, nb::ndim<1>> occluded(const Scene& scene, Floats2 origins, Floats2 directions,
+nb::ndarray<nb::numpy, uint8_t, nb::ndim<1>> occluded_rays(const Scene& scene, Floats2 origins, Floats2 directions,
                                                       Floats1 t_max) {
     require_built(scene);
     const auto o = span_of<Vec3>(origins), d = span_of<Vec3>(directions);
@@ -126,8 +126,7 @@ void bind_scene(nb::module_& m) {
                                   layered_under.data()[i],
                                   compensate.data()[i] != 0};
                  }
-                 const BuiltMaterial built = build_material(inputs, rgb_of(emission));
-                 return s.add_material(built.material, built.lobes);
+                 return s.add_material(inputs, rgb_of(emission));
              })
         .def("add_instance",
              [](Scene& s, uint32_t geometry, FloatMatrix transform, Ints1 materials, uint32_t visibility) {
@@ -174,8 +173,8 @@ void bind_scene(nb::module_& m) {
                  s.set_film(width, height, {x, y, window_width, window_height}, transparent);
              })
         .def("build", &Scene::build, nb::arg("threads") = 0, nb::call_guard<nb::gil_scoped_release>())
-        .def("intersect", &intersect, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))
-        .def("occluded", &occluded, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))
+        .def("intersect", &intersect_rays, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))
+        .def("occluded", &occluded_rays, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))
         .def("info", &info_of);
 }
 

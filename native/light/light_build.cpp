@@ -168,17 +168,6 @@ float power(const Light& light, float scene_radius) {
     return static_cast<float>(watts);
 }
 
-std::vector<uint32_t> list_lamps(std::span<const Light> lights) {
-    std::vector<uint32_t> lamps;
-    for (uint32_t i = 0; i < lights.size(); ++i) {
-        const Light& light = lights[i];
-        const bool round =
-            light.kind == LightKind::point || light.kind == LightKind::spot || light.kind == LightKind::sun;
-        if (light.kind == LightKind::area || (round && light.radius > 0)) lamps.push_back(i);
-    }
-    return lamps;
-}
-
 std::vector<uint32_t> make_distribution(std::span<const double> weights) {
     double total = 0;
     for (const double w : weights) total += w;

@@ -8,8 +8,8 @@ namespace vlp {
 // The same numbers as vlp_bpt.scene.LobeKind.
 enum class LobeKind : uint8_t { diffuse, translucent, reflection, dielectric, refraction, transparent };
 
-// The Fresnel term of a reflection lobe; the same numbers as vlp_bpt.scene.Fresnel.
-enum class Fresnel : uint8_t { none, dielectric, schlick, conductor };
+// The Fresnel term of a lobe; the same numbers as vlp_bpt.scene.Fresnel.
+enum class Fresnel : uint8_t { none, dielectric, schlick, conductor, tinted_dielectric };
 
 struct Lobe {
     LobeKind kind = LobeKind::diffuse;
@@ -20,12 +20,16 @@ struct Lobe {
     float alpha = 0;            // GGX width; 0: specular
     float eta = 1;              // index of refraction inside over outside, outside being where the normal points
     Rgb weight;
-    Rgb f0;   // schlick: reflectance at normal incidence; conductor: eta
-    Rgb f82;  // schlick: tint near 82 degrees; conductor: k
+    // none: reflectance; dielectric: tint of the reflection; tinted_dielectric: tint of the reflectance at normal
+    // incidence; schlick: reflectance at normal incidence; conductor: index of refraction
+    Rgb f0 = rgb(1);
+    // dielectric lobe: tint of what it refracts; schlick: tint near 82 degrees; conductor: absorption index k
+    Rgb f82 = rgb(1);
 };
 
-// Lobes of width below this are specular: a delta distribution.
-inline constexpr float k_min_alpha = 1e-6f;
+// GGX lobes of width below this are specular: a delta distribution. The same width as in Cycles (a roughness of
+// 0.0038); single precision cannot resolve much narrower lobes.
+inline constexpr float k_min_alpha = 1.4142e-5f;
 
 VLP_HD constexpr bool is_specular(const Lobe& lobe) {
     return lobe.kind != LobeKind::diffuse && lobe.kind != LobeKind::translucent && lobe.alpha < k_min_alpha;

@@ -4,8 +4,9 @@
 #include <chrono>
 #include <stdexcept>
 
-#include "bsdf/albedo.h"
+#include "bsdf/albedo_tables.h"
 #include "geometry/octahedral.h"
+#include "light/light.h"
 #include "light/light_build.h"
 
 namespace vlp {
@@ -89,11 +90,8 @@ uint32_t Scene::add_spheres(std::span<const Vec3> centers, std::span<const float
     return static_cast<uint32_t>(geometries_.size() - 1);
 }
 
-uint32_t Scene::add_material(Material material, std::span<const Lobe> lobes) {
-    material.first_lobe = static_cast<uint32_t>(lobes_.size());
-    material.lobe_count = static_cast<uint32_t>(lobes.size());
-    lobes_.insert(lobes_.end(), lobes.begin(), lobes.end());
-    materials_.push_back(material);
+uint32_t Scene::add_material(std::span<const LobeInput> lobes, Rgb emission) {
+    materials_.push_back(build_material(lobes, emission, lobes_));
     return static_cast<uint32_t>(materials_.size() - 1);
 }
 
@@ -249,11 +247,6 @@ void Scene::make_light_tables() {
         if (is_delta(light) || light.instance != k_none) continue;
         (is_infinite(light) ? infinite_lights_ : lamps_).push_back(i);
     }
-};
-    view_.lamps = {lamps_.data(), static_cast<uint32_t>(lamps_.size())};
-    view_.infinite_lights = infinite_lights_.data();
-    view_.infinite_light_count = static_cast<uint32_t>(infinite_lights_.size());
-    view_.light_of_primitive = light_of_primitive_.data();
 }
 
 }  // namespace vlp

@@ -8,6 +8,7 @@
 #include "bvh/build.h"
 #include "core/parallel.h"
 #include "film/film.h"
+#include "scene/material_build.h"
 #include "scene/scene_view.h"
 
 namespace vlp {
@@ -18,8 +19,8 @@ public:
     uint32_t add_mesh(std::span<const Vec3> positions, std::span<const Triangle> triangles,
                       std::span<const Vec3> corner_normals, std::span<const Vec2> uvs, std::span<const int32_t> slots);
     uint32_t add_spheres(std::span<const Vec3> centers, std::span<const float> radii, std::span<const int32_t> slots);
-    // Index of the new material; its first_lobe is set here.
-    uint32_t add_material(Material material, std::span<const Lobe> lobes);
+    // Index of the new material. Throws std::invalid_argument naming the lobe and the value at fault.
+    uint32_t add_material(std::span<const LobeInput> lobes, Rgb emission);
     void add_instance(uint32_t geometry, const Affine& object_to_world, std::span<const int32_t> materials,
                       uint32_t visibility);
     void add_lamp(Light light, uint32_t visibility);
