@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
+import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vlp_bpt import metrics
+from vlp_bpt._blender import capture_blend
 from vlp_bpt.errors import Error
 from vlp_bpt.render import Renderer, load_native
-from vlp_bpt.scene import Scene
+from vlp_bpt.scene import Film, Scene
 from vlp_bpt.settings import MODE_PRESETS, Mode, RenderSettings
 from vlp_bpt.snapshot import load_snapshot, scene_digest
 
@@ -50,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE",
         help="names of files in scenes/, or .blend or .vlp.npz files (default: cornell_box sierpinski)",
     )
-    parser.add_argument("--size", type=int, default=512, help="width and height in pixels (default: 512)")
+    parser.add_argument("--size", type=int, default=512, help="width in pixels (default: 512)")
     parser.add_argument("--seconds", type=float, default=30.0, help="render time of each contestant (default: 30)")
     parser.add_argument(
         "--reference-seconds",
@@ -64,14 +67,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace | Sequence[str] | None = None) -> int:
-    """Run the benchmark and print its table. Raises Error for a scene that cannot be rendered."""
+    """Run the benchmark and print its table; returns the exit code, 1 for a scene that cannot be rendered."""
     if not isinstance(args, argparse.Namespace):
         parser = argparse.ArgumentParser(prog="vlp-bpt bench", description=__doc__)
         add_arguments(parser)
         args = parser.parse_args(args)
     rows: list[Row] = []
-    for name in args.scenes:
-        rows += bench_scene(find_scene(name), args)
+    try:
+        for name in args.scenes:
+            rows += bench_scene(find_scene(name), args)
+    except Error as error:
+        print(f"vlp-bpt: {error}", file=sys.stderr)
+        return 1
     print(f"\n{conditions(args)}\n\n{table(rows)}")
     if args.json:
         args.json.write_text(json.dumps([asdict(row) for row in rows], indent=1))
@@ -88,14 +95,17 @@ def find_scene(name: str) -> Path:
 
 
 def load_scene(path: Path, size: int) -> Scene:
-    """The scene of a .blend (needs bpy) or snapshot file at size x size pixels."""
+    """The scene of a .blend (needs bpy) or snapshot file, `size` pixels wide and as high as its shape asks."""
     if path.suffix == ".npz":
         scene = load_snapshot(path).scene
-        scene.film = replace(scene.film, width=size, height=size, window=None)
-        return scene
-    from .blender import export_blend
-
-    return export_blend(path, size, size)
+    else:
+        snapshot, warnings = capture_blend(path, None, {})
+        scene = snapshot.scene
+        for warning in warnings:
+            print(f"{path.stem}: {warning}")
+    height = max(1, round(size * scene.film.height / scene.film.width))
+    scene.film = Film(size, height)
+    return scene
 
 
 def bench_scene(path: Path, args: argparse.Namespace) -> list[Row]:
@@ -140,21 +150,30 @@ def entries(path: Path, scene: Scene, args: argparse.Namespace) -> list[Contesta
     ]
     if args.no_cycles or path.suffix == ".npz":
         return result
-    size, scatterings = (args.size, args.size), MODE_PRESETS[Mode.BALANCED].eye_path_length
+    size, scatterings = (scene.film.width, scene.film.height), MODE_PRESETS[Mode.BALANCED].eye_path_length
     result.append(Cycles("Cycles", path, size, scatterings, args.threads))
     if path.stem == "sierpinski":
-        from .blender import mesh_variant
-
         meshes = mesh_variant(path, MESH_LEVELS)
         result.append(Cycles("Cycles, spheres as meshes", meshes, size, scatterings, args.threads))
     return result
+
+
+def mesh_variant(path: Path, levels: int) -> Path:
+    """The Sierpinski scene with meshes for spheres, written by the script that lies beside it, once."""
+    output = Path("out") / f"sierpinski_mesh_{levels}.blend"
+    if not output.exists():
+        output.parent.mkdir(exist_ok=True)
+        script = path.with_suffix(".py")
+        command = [sys.executable, str(script), "--mesh", str(output), "--levels", str(levels)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return output
 
 
 def reference_halves(
     name: str, scene: Scene, seconds: float, threads: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Two independent REFERENCE pictures (h, w, 3), top row first, of `seconds` each; made once and kept."""
-    native = Path(load_native()._module.__file__)
+    native = Path(load_native()._module.__file__ or "")
     key = fingerprint([native], {"scene": scene_digest(scene), "seconds": seconds})
 
     def make(index: int) -> NDArray[np.float32]:
@@ -171,7 +190,7 @@ def reference_halves(
 def conditions(args: argparse.Namespace) -> str:
     """What was measured and how, in a sentence or two above the table."""
     return (
-        f"{args.size} x {args.size} pixels, {args.seconds:g} s each in {ROUNDS} slices by turns; time is rendering alone, without "
+        f"{args.size} pixels wide, {args.seconds:g} s each in {ROUNDS} slices by turns; time is rendering alone, without "
         "reading and preparing the scene.\nrelMSE and SSIM against a REFERENCE picture, its own noise taken out. K, L: most "
         "surface hits of eye and light paths; C: VLP connections.\nCycles' bounces are those of K; its adaptive sampling, "
         "clamps, denoiser and light tree are off."
@@ -180,8 +199,9 @@ def conditions(args: argparse.Namespace) -> str:
 
 def table(rows: list[Row]) -> str:
     """The rows as a Markdown table."""
-    head = ["scene", "", "window", "iterations/s", "M eye samples/s (slices)"]
     count = max(len(row.error) for row in rows)
+    head = ["scene", "", "window", "iterations/s", "M eye samples/s (slices)", "after: relMSE / SSIM"]
+    head += [""] * (count - 1)
     lines: list[list[str]] = []
     for row in rows:
         low, high = (rate / 1e6 for rate in row.rate_range)
@@ -189,7 +209,6 @@ def table(rows: list[Row]) -> str:
         errors = [f"{seconds:.1f} s: {error:.2e} / {ssim:.4f}" for seconds, error, ssim in row.error]
         rate = f"{row.rate / 1e6:.2f} ({low:.2f}-{high:.2f})"
         lines.append([row.scene, row.name, row.window, iterations, rate, *errors])
-    head += ["time: relMSE / SSIM"] + [""] * (count - 1)
     widths = [max(len(line[i]) for line in [head, *lines]) for i in range(len(head))]
     rule = ["-" * width for width in widths]
     return "\n".join(

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vlp_bpt._blender import _console as quiet
 from vlp_bpt.errors import Error
 
 
@@ -37,7 +38,8 @@ def open_scene(blend: Path) -> Any:
         import addon_utils
 
         addon_utils.enable("cycles")
-    bpy.ops.wm.open_mainfile(filepath=str(Path(blend).resolve()))
+    with quiet():
+        bpy.ops.wm.open_mainfile(filepath=str(Path(blend).resolve()))
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.use_persistent_data = False
@@ -101,7 +103,8 @@ def render(
         path = Path(folder) / "cycles.exr"
         scene.render.filepath = str(path)
         scene.render.use_file_extension = False
-        bpy.ops.render.render(write_still=True, scene=scene.name)
+        with quiet():
+            bpy.ops.render.render(write_still=True, scene=scene.name)
         return CyclesImage(*_read(path), samples)
 
 
