@@ -1,11 +1,11 @@
-"""What the benchmark races: this renderer in some setting, and Cycles; each renders slices that add up to one picture."""
+"""What the benchmark races: this renderer in some setting, and Cycles; slices of each add up to one picture."""
 
 from __future__ import annotations
 
-import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,40 +20,50 @@ Pixels = NDArray[np.float64]
 CYCLES_SEQUENCE = 1 << 16  # samples of the one sequence that all slices belong to
 
 
-class Contestant(Protocol):
-    """name and window are for the table; seconds, iterations and eye_samples count all slices; iterations is None for
-    a renderer that has none."""
+@dataclass
+class Contestant:
+    """Somebody in the race. seconds and eye_samples count all slices; rates: eye samples per second of each slice."""
 
     name: str
-    window: str
-    seconds: float
-    eye_samples: int
-    rates: list[float]
+    seconds: float = field(default=0.0, init=False)
+    eye_samples: int = field(default=0, init=False)
+    rates: list[float] = field(default_factory=list, init=False)
 
     @property
-    def iterations(self) -> int | None: ...
+    def window(self) -> str:
+        """The path lengths, in words."""
+        raise NotImplementedError
+
+    @property
+    def iterations(self) -> int | None:
+        """Iterations so far, None for a renderer that has none."""
+        return None
 
     def run(self, seconds: float) -> None:
-        """Render about that long; adds eye samples per second to `rates`."""
+        """Render about that long."""
+        raise NotImplementedError
 
     def picture(self) -> Pixels:
         """The mean picture so far (h, w, 3), top row first."""
+        raise NotImplementedError
+
+    def _count(self, seconds: float, eye_samples: int) -> None:
+        self.seconds += seconds
+        self.eye_samples += eye_samples
+        self.rates.append(eye_samples / max(seconds, 1e-2))
 
 
 @dataclass
-class Ours:
+class Ours(Contestant):
     """This renderer: iterations until the slice is over."""
 
-    name: str
     scene: Scene
     settings: RenderSettings
-    seconds: float = 0.0
-    eye_samples: int = 0
-    rates: list[float] = field(default_factory=list)
-    _renderer: Renderer | None = None
+    _renderer: Renderer | None = field(default=None, init=False)
 
     @property
     def renderer(self) -> Renderer:
+        """Made at the first use."""
         if self._renderer is None:
             self._renderer = Renderer(self.scene, self.settings)
         return self._renderer
@@ -69,56 +79,43 @@ class Ours:
 
     def run(self, seconds: float) -> None:
         renderer = self.renderer
-        before, samples_before = renderer.statistics.seconds, renderer.statistics.eye_samples
-        while (spent := renderer.statistics.seconds - before) < seconds:
-            done = renderer.statistics.eye_samples - samples_before
-            width_height = renderer.film.width * renderer.film.height
-            pace = spent * width_height / done if done else seconds
+        before = renderer.statistics
+        spent, done = 0.0, 0
+        while spent < seconds:
+            pace = spent / done if done else seconds
             renderer.iterate(max(1, min(int(0.25 * seconds / pace), int((seconds - spent) / pace))))
-        taken = renderer.statistics.seconds - before
-        made = renderer.statistics.eye_samples - samples_before
-        self.seconds += taken
-        self.eye_samples += made
-        self.rates.append(made / taken)
+            spent = renderer.statistics.seconds - before.seconds
+            done = renderer.statistics.iterations - before.iterations
+        self._count(spent, renderer.statistics.eye_samples - before.eye_samples)
 
     def picture(self) -> Pixels:
         return self.renderer.read()[::-1, :, :3].astype(np.float64)
 
 
 @dataclass
-class Cycles:
+class Cycles(Contestant):
     """Cycles in the same process: slices of one sample sequence, as long as the pace so far says."""
 
-    name: str
     blend: Path
     size: tuple[int, int]
     scatterings: int
     threads: int = 0
-    seconds: float = 0.0
-    eye_samples: int = 0
-    rates: list[float] = field(default_factory=list)
-    _samples: int = 0
-    _sum: Pixels | None = None
+    _samples: int = field(default=0, init=False)
+    _sum: Pixels | None = field(default=None, init=False)
 
     @property
     def window(self) -> str:
         return f"max bounces {self.scatterings - 1}"
 
-    @property
-    def iterations(self) -> int | None:
-        return None
-
     def run(self, seconds: float) -> None:
-        scene = self._open()
+        scene = cycles.open_scene(self.blend)
+        cycles.set_size(scene, *self.size)
         pace = self.seconds / self._samples if self._samples else self._first_pace(scene)
         image = self._render(scene, max(1, round(seconds / pace)), self._samples)
         weighted = image.pixels[..., :3].astype(np.float64) * image.samples
         self._sum = weighted if self._sum is None else self._sum + weighted
-        made = image.samples * self.size[0] * self.size[1]
         self._samples += image.samples
-        self.seconds += image.seconds
-        self.eye_samples += made
-        self.rates.append(made / max(image.seconds, 1e-2))
+        self._count(image.seconds, image.samples * self.size[0] * self.size[1])
 
     def picture(self) -> Pixels:
         if self._sum is None:
@@ -142,17 +139,13 @@ class Cycles:
             threads=self.threads,
         )
 
-    def _open(self) -> Any:
-        scene = cycles.open_scene(self.blend)
-        cycles.set_size(scene, *self.size)
-        return scene
 
-
-def race(contestants: list[Contestant], seconds: float, rounds: int, observe: Any) -> None:
+def race(
+    contestants: list[Contestant], seconds: float, rounds: int, observe: Callable[[Contestant, int], None]
+) -> None:
     """Each contestant gets `seconds` in `rounds` slices, in turns, the order turned round each time, so that whatever
     else the machine does meets all alike. `observe(contestant, round)` is called after each slice, untimed."""
     for index in range(rounds):
         for contestant in contestants if index % 2 == 0 else contestants[::-1]:
             contestant.run(seconds / rounds)
             observe(contestant, index)
-            time.sleep(0.05)

@@ -1,8 +1,8 @@
 """Cycles on the CPU as an unbiased renderer to compare with: everything off that trades truth for speed.
 
-The path-length window. `scatterings` is the largest number of surface hits between the lens and the light, both ends left
-out. Cycles' `max_bounces` = B evaluates direct light at B + 1 hits and the emission that one ray beyond them finds, so
-B = scatterings - 1. Here an eye path of at most K hits with light samples alone (C = 0) has scatterings = K; joined to
+The path-length window. `scatterings` is the largest number of surface hits between the lens and the light, both ends
+left out. Cycles' `max_bounces` = B evaluates direct light at B + 1 hits and the emission that one ray beyond them
+finds, so B = scatterings - 1. Here an eye path of at most K hits with light samples alone (C = 0) has scatterings = K; joined to
 light paths of at most L hits, K + L.
 """
 
@@ -110,13 +110,13 @@ def render(
 
 def _read(path: Path) -> tuple[NDArray[np.float32], float]:
     """Pixels and the render time that the engine stamped into an EXR file."""
-    import OpenImageIO as oiio
+    import OpenImageIO
 
-    image = oiio.ImageInput.open(str(path))
+    image = OpenImageIO.ImageInput.open(str(path))
     if image is None:
         raise Error(f"Cycles wrote no image to '{path}'")
     spec = image.spec()
-    pixels = np.ascontiguousarray(image.read_image(0, 0, 0, 4, oiio.FLOAT), np.float32)
+    pixels = np.ascontiguousarray(image.read_image(0, 0, 0, 4, OpenImageIO.FLOAT), np.float32)
     times = [a.value for a in spec.extra_attribs if a.name.startswith("cycles.") and a.name.endswith(".render_time")]
     image.close()
     if not times:

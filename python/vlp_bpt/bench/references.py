@@ -1,4 +1,4 @@
-"""Converged pictures as independent batches, kept on disk: one file for each batch, so that making them can be interrupted."""
+"""Converged pictures as independent batches, kept on disk: a file for each, so that making them can be interrupted."""
 
 from __future__ import annotations
 
