@@ -7,12 +7,12 @@ which their noise is measured. Two families of tests share the stated false-alar
 - regions: the means of a coarse grid of regions are equal within a tolerance, plus noise.
 
 Each family is Sidak-corrected for its number of tests. Student's t has the degrees of freedom of the smaller set of
-batches, which never raises more alarms than stated (Mickey and Brown 1966); Welch's, with unequal variances, does so far
-out in the tails, where the correction looks.
+batches, which never raises more alarms than stated (Mickey and Brown 1966); Welch's, with unequal variances, does so
+far out in the tails, where the correction looks.
 
 The t-test assumes means of batches to be close to normal. Blocks where one batch dominates (fireflies) must be rejected
-by their medians of means as well, which never raises false alarms; where there are many of them the images are too noisy
-to judge, and the comparison fails.
+by their medians of means as well, which never raises false alarms; where there are many of them the images are too
+noisy to judge, and the comparison fails.
 """
 
 from __future__ import annotations

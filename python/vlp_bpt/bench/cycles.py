@@ -2,8 +2,8 @@
 
 The path-length window. `scatterings` is the largest number of surface hits between the lens and the light, both ends
 left out. Cycles' `max_bounces` = B evaluates direct light at B + 1 hits and the emission that one ray beyond them
-finds, so B = scatterings - 1. Here an eye path of at most K hits with light samples alone (C = 0) has scatterings = K; joined to
-light paths of at most L hits, K + L.
+finds, so B = scatterings - 1. Here an eye path of at most K hits with light samples alone (C = 0) has
+scatterings = K; joined to light paths of at most L hits, K + L.
 """
 
 from __future__ import annotations
@@ -117,7 +117,9 @@ def _read(path: Path) -> tuple[NDArray[np.float32], float]:
         raise Error(f"Cycles wrote no image to '{path}'")
     spec = image.spec()
     pixels = np.ascontiguousarray(image.read_image(0, 0, 0, 4, OpenImageIO.FLOAT), np.float32)
-    times = [a.value for a in spec.extra_attribs if a.name.startswith("cycles.") and a.name.endswith(".render_time")]
+    times = [
+        str(a.value) for a in spec.extra_attribs if a.name.startswith("cycles.") and a.name.endswith(".render_time")
+    ]
     image.close()
     if not times:
         raise Error(f"Cycles stamped no render time into '{path}'")
