@@ -191,7 +191,7 @@ def conditions(args: argparse.Namespace) -> str:
     """What was measured and how, in a sentence or two above the table."""
     return (
         f"{args.size} pixels wide, {args.seconds:g} s each in {ROUNDS} slices by turns; time is rendering alone,\n"
-        "without reading and preparing the scene. relMSE and SSIM against a REFERENCE picture, its own noise taken out.\n"
+        "reading and preparing the scene left out. relMSE and SSIM are against a REFERENCE picture, less its noise.\n"
         "K, L: most surface hits of eye and light paths; C: VLP connections. Cycles' bounces are those of K; its\n"
         "adaptive sampling, clamps, denoiser and light tree are off."
     )
