@@ -1,16 +1,18 @@
 """Statistical comparison of two rendered images: are their differences more than noise?
 
-Both images come as independent batches (n, h, w, c), renders of the same picture with different random numbers, from which
-their noise is measured. Two families of tests share the stated false-alarm rate:
+Both images come as independent batches (n, h, w, c), renders of the same picture with different random numbers, from
+which their noise is measured. Two families of tests share the stated false-alarm rate:
 
 - blocks: the means of 8 x 8 pixel blocks are equal (t-test with both variances);
 - regions: the means of a coarse grid of regions are equal within a tolerance, plus noise.
 
-Each family is Sidak-corrected for its number of tests. Student's t has the degrees of freedom of the smaller set of batches,
-which never raises more alarms than stated (Mickey and Brown 1966); Welch's, with unequal variances, does so far out in the
-tails, where the correction looks. The t-test assumes means of batches to be close to normal; blocks
-where one batch dominates (fireflies) must be rejected by their medians of means as well, so that the correction can only
-make a test stricter to fail, never raise false alarms, and if there are many such blocks the images are too noisy to judge.
+Each family is Sidak-corrected for its number of tests. Student's t has the degrees of freedom of the smaller set of
+batches, which never raises more alarms than stated (Mickey and Brown 1966); Welch's, with unequal variances, does so
+far out in the tails, where the correction looks.
+
+The t-test assumes means of batches to be close to normal. Blocks where one batch dominates (fireflies) must be rejected
+by their medians of means as well, which never raises false alarms; where there are many of them the images are too
+noisy to judge, and the comparison fails.
 """
 
 from __future__ import annotations
@@ -165,17 +167,19 @@ class Comparison:
         if (bad := self.region_p < self.region_threshold).any():
             worst = np.unravel_index(int(self.region_p.argmin()), self.region_p.shape)
             result.append(
-                f"{int(bad.sum())} of {bad.size} region means differ by more than {self.tolerance:.2%}; worst at region "
-                f"{tuple(map(int, worst))}: {self.region_error[worst]:+.2%}, p = {self.region_p.min():.2g}"
+                f"{int(bad.sum())} of {bad.size} region means differ by more than {self.tolerance:.2%}; worst at "
+                f"region {tuple(map(int, worst))}: {self.region_error[worst]:+.2%}, p = {self.region_p.min():.2g}"
             )
         return result
 
     def summary(self) -> str:
         """One line of figures."""
         return (
-            f"mean {self.ours.mean() / self.theirs.mean() - 1:+.3%}, regions within {np.abs(self.region_error).max():.3%}, "
+            f"mean {self.ours.mean() / self.theirs.mean() - 1:+.3%}, "
+            f"regions within {np.abs(self.region_error).max():.3%}, "
             f"smallest p: blocks {self.block_p.min():.2g} (threshold {self.block_threshold:.2g}), "
-            f"regions {self.region_p.min():.2g} ({self.region_threshold:.2g}), heavy-tailed blocks {self.heavy.mean():.2%}"
+            f"regions {self.region_p.min():.2g} ({self.region_threshold:.2g}), "
+            f"heavy-tailed blocks {self.heavy.mean():.2%}"
         )
 
 
@@ -197,7 +201,7 @@ def compare(
     if min(len(ours), len(theirs)) < 4 or ours.shape[1:] != theirs.shape[1:]:
         raise ValueError(f"batches of shapes {ours.shape} and {theirs.shape} cannot be compared")
     a, b = np.asarray(ours, np.float64), np.asarray(theirs, np.float64)
-    h, w, c = a.shape[1:]
+    h, w = a.shape[1:3]
     share = false_alarm / 2 if blocks_equal else false_alarm
 
     cells = np.arange(0, h, block), np.arange(0, w, block)
@@ -229,17 +233,17 @@ def compare(
 
 def write_image(path: Path, pixels: Array) -> None:
     """An EXR (or whatever the ending says) of pixels (h, w, c), top row first."""
-    import OpenImageIO as oiio  # type: ignore[import-not-found]
+    import OpenImageIO
 
     data = np.ascontiguousarray(pixels, np.float32)
-    buffer = oiio.ImageBuf(oiio.ImageSpec(data.shape[1], data.shape[0], data.shape[2], oiio.FLOAT))
-    buffer.set_pixels(oiio.ROI(), data)
+    buffer = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(data.shape[1], data.shape[0], data.shape[2], OpenImageIO.FLOAT))
+    buffer.set_pixels(OpenImageIO.ROI(), data)
     if not buffer.write(str(path)):
         raise OSError(f"'{path}' cannot be written: {buffer.geterror()}")
 
 
 def assert_agree(name: str, comparison: Comparison, again: str, folder: Path = Path("out/failures")) -> None:
-    """Fail with the figures, after writing both images, their difference and the p-values; `again` says seed and command."""
+    """Fail with the figures, after writing images, difference and p-values; `again` says seed and command."""
     print(f"{name}: {comparison.summary()}")
     if not comparison.failures:
         return
