@@ -126,6 +126,29 @@ TEST(LightNextEvent, SurfacesAreNamedAndLampsAreNot) {
     }
 }
 
+// Points that next event never draws have no density: the far side of a sphere from outside, the back of an area lamp, and
+// what lies outside the beam of a spread one.
+TEST(LightNextEvent, PointsNeverDrawnHaveNoDensity) {
+    const Vec3 o = k_light_position, axis = -turned({}).column(2), side = turned({}).column(0);
+    const auto pdf = [&](LightScene s, Vec3 receiver, Vec3 position, Vec3 normal) {
+        return pdf_next_event(s.scene(), s.light, receiver, position, normal, normalize(position - receiver));
+    };
+    const Vec3 receiver = o + axis * 2.0f;
+    for (const auto& light : {make_point(o, k_power, 0.5f), make_sphere(o, 0.5f, k_power, 0, 0)}) {
+        EXPECT_GT(pdf({"sphere", light, 0}, receiver, o + axis * 0.5f, axis), 0);
+        EXPECT_EQ(pdf({"sphere", light, 0}, receiver, o - axis * 0.5f, axis), 0);
+        EXPECT_GT(pdf({"sphere", light, 0}, o, o + axis * 0.5f, -axis), 0);
+    }
+    for (const bool ellipse : {false, true}) {
+        const LightScene lambertian("area", make_area(turned(o), k_power, 2, 2, ellipse, k_pi), 0);
+        const LightScene beam("beam", make_area(turned(o), k_power, 2, 2, ellipse, 0.4f), 0);
+        EXPECT_GT(pdf(lambertian, receiver, o + side * 0.9f, axis), 0);
+        EXPECT_EQ(pdf(lambertian, o - axis, o + side * 0.9f, axis), 0);
+        EXPECT_GT(pdf(beam, receiver, o + side * 0.2f, axis), 0);
+        EXPECT_EQ(pdf(beam, receiver, o + side * 0.9f, axis), 0);
+    }
+}
+
 // Irradiance of a small surface at `receiver` that faces `normal`, green channel, with its standard error.
 struct Estimate {
     double mean = 0, error = 0;
