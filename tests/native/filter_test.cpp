@@ -6,20 +6,20 @@
 #include "film/filter.h"
 #include "goodness_of_fit.h"
 
-namespace vlp::test {
+namespace vlp::testing {
 namespace {
 
-constexpr uint64_t k_seed = 20240614;
+constexpr uint32_t k_seed = 20240614;
 constexpr Filter k_filters[] = {Filter::box, Filter::gaussian, Filter::blackman_harris};
 
 // Six fits of significance 1e-6 over cells of the middle half of the support, with all the rest as one more cell.
 TEST(PixelFilter, SamplesFollowTheFilter) {
-    Random random(k_seed);
+    Random random{k_seed};
     for (const Filter filter : k_filters) {
         for (const float width : {1.0f, 1.5f}) {
             const float extent = 2 * filter_radius(filter, width) * (filter == Filter::box ? 1.0f : 0.7f);
             const auto draw = [&](float(&point)[2]) {
-                const Vec2 x = sample(filter, width, uniform_2d(random));
+                const Vec2 x = sample(filter, width, random.next_2d());
                 EXPECT_LE(max_of(std::fabs(x.x), std::fabs(x.y)), filter_radius(filter, width));
                 point[0] = x.x / extent + 0.5f, point[1] = x.y / extent + 0.5f;
                 return point[0] >= 0 && point[0] < 1 && point[1] >= 0 && point[1] < 1;
@@ -71,4 +71,4 @@ TEST(PixelFilter, BlackmanHarrisInverse) {
 }
 
 }  // namespace
-}  // namespace vlp::test
+}  // namespace vlp::testing

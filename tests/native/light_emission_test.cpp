@@ -3,13 +3,13 @@
 
 #include "light_scenes.h"
 
-namespace vlp::test {
+namespace vlp::testing {
 namespace {
 
-constexpr uint64_t k_seed = 20240612;
+constexpr uint32_t k_seed = 20240612;
 
 Emission draw_emission(LightScene& s, Random& random) {
-    const Vec2 u_position = uniform_2d(random), u_direction = uniform_2d(random);
+    const Vec2 u_position = random.next_2d(), u_direction = random.next_2d();
     return sample_emission(s.scene(), s.light, u_position, u_direction);
 }
 
@@ -85,7 +85,7 @@ DirectionMap directions_of(LightScene& s, Random& random) {
 
 // 20 fits in the four dimensions of (position, direction), of significance 1e-6: a false-alarm rate of 2e-5.
 TEST(LightEmission, RaysFollowTheirDensity) {
-    Random random(k_seed);
+    Random random{k_seed};
     for (LightScene& s : light_scenes()) {
         SCOPED_TRACE(s.name);
         const PositionMap positions{s};
@@ -97,8 +97,8 @@ TEST(LightEmission, RaysFollowTheirDensity) {
             const Vec2 p = positions.point(e.position, e.direction);
             const Vec2 d = one_direction ? Vec2{0.5f, 0.5f} : map.point(e.direction);
             point[0] = p.x, point[1] = p.y, point[2] = d.x, point[3] = d.y;
-            if (one_place) point[0] = uniform(random), point[1] = uniform(random);
-            if (one_direction) point[2] = uniform(random), point[3] = uniform(random);
+            if (one_place) point[0] = random.next(), point[1] = random.next();
+            if (one_direction) point[2] = random.next(), point[3] = random.next();
             return true;
         };
         const auto density = [&](const float(&point)[4]) {
@@ -114,7 +114,7 @@ TEST(LightEmission, RaysFollowTheirDensity) {
 }
 
 TEST(LightEmission, DensitiesAndWeightsAgreeWithEmittedRadiance) {
-    Random random(k_seed);
+    Random random{k_seed};
     for (LightScene& s : light_scenes()) {
         SCOPED_TRACE(s.name);
         for (int i = 0; i < 2000; ++i) {
@@ -137,7 +137,7 @@ TEST(LightEmission, DensitiesAndWeightsAgreeWithEmittedRadiance) {
 
 // 5 standard errors (6e-7 each) and 1e-4 for single precision.
 TEST(LightEmission, CarriesTheWattsAskedFor) {
-    Random random(k_seed);
+    Random random{k_seed};
     for (LightScene& s : light_scenes()) {
         SCOPED_TRACE(s.name);
         constexpr int k_draws = 100000;
@@ -153,7 +153,7 @@ TEST(LightEmission, CarriesTheWattsAskedFor) {
         } else {  // a stretched cone: by directions all around
             double lit = 0, lit_squares = 0;
             for (int i = 0; i < k_draws; ++i) {
-                const double f = 3 * static_cast<double>(spot_falloff(s.light, sample_sphere(uniform_2d(random))));
+                const double f = 3 * static_cast<double>(spot_falloff(s.light, sample_sphere(random.next_2d())));
                 lit += f, lit_squares += f * f;
             }
             const double truth = lit / k_draws, lit_error = std::sqrt((lit_squares / k_draws - truth * truth) / k_draws);
@@ -165,7 +165,7 @@ TEST(LightEmission, CarriesTheWattsAskedFor) {
 // The mean irradiance of a disc, once by what light paths carry onto it and once by next event from its points. Both means
 // are over many draws; they may differ by 5 standard errors: 60 comparisons, a false-alarm rate of 4e-5.
 TEST(LightEmission, LightsADiscAsNextEventDoes) {
-    Random random(k_seed);
+    Random random{k_seed};
     constexpr float k_radius = 0.5f;
     constexpr int k_rays = 400000, k_points = 100000;
     const Vec3 axis = -turned({}).column(2), side = turned({}).column(0);
@@ -187,9 +187,9 @@ TEST(LightEmission, LightsADiscAsNextEventDoes) {
                 rays += w, rays2 += w * w;
             }
             for (int i = 0; i < k_points; ++i) {
-                const Vec2 d = k_radius * sample_disc(uniform_2d(random));
+                const Vec2 d = k_radius * sample_disc(random.next_2d());
                 const Vec3 p = center + frame.tangent * d.x + frame.bitangent * d.y;
-                const NextEvent e = sample_next_event(s.scene(), s.light, p, uniform_2d(random));
+                const NextEvent e = sample_next_event(s.scene(), s.light, p, random.next_2d());
                 const double cosine = static_cast<double>(dot(e.direction, normal));
                 if (!e.valid() || cosine <= 0) continue;
                 const double w = static_cast<double>(e.radiance.r / e.pdf_solid_angle) * cosine;
@@ -215,4 +215,4 @@ TEST(LightEmission, SphereLampsShineOutward) {
 }
 
 }  // namespace
-}  // namespace vlp::test
+}  // namespace vlp::testing

@@ -4,10 +4,10 @@
 #include "light/light_choice.h"
 #include "light_scenes.h"
 
-namespace vlp::test {
+namespace vlp::testing {
 namespace {
 
-constexpr uint64_t k_seed = 20240613;
+constexpr uint32_t k_seed = 20240613;
 
 bool sane(const Emission& e) {
     if (is_black(e.weight)) return true;
@@ -23,7 +23,7 @@ bool sane(const NextEvent& e) {
 
 // Receivers on the light, on its plane, at its centre, beside it by rounding, and far beyond; numbers at both ends.
 TEST(LightRobustness, AnyReceiverAndAnyNumbers) {
-    Random random(k_seed);
+    Random random{k_seed};
     std::vector<LightScene> scenes = light_scenes();
     const Vec3 o = k_light_position;
     for (const float size : {1e-12f, 1e-6f, 1e-3f, 1.0f, 1e3f, 1e6f}) {
@@ -40,11 +40,11 @@ TEST(LightRobustness, AnyReceiverAndAnyNumbers) {
         SCOPED_TRACE(s.name);
         std::vector<Vec3> places = {o, o + Vec3{1e-30f, 0, 0}, o + Vec3{1e30f, 0, 0}};
         for (int i = 0; i < 60; ++i) {
-            const Emission e = sample_emission(s.scene(), s.light, uniform_2d(random), uniform_2d(random));
+            const Emission e = sample_emission(s.scene(), s.light, random.next_2d(), random.next_2d());
             places.push_back(e.position);                                // on it
             places.push_back(e.position + e.normal * 1e-7f);             // just above
             places.push_back(o + s.light.axis_u * 3.0f);                 // in the plane of an area lamp
-            places.push_back(o + sample_sphere(uniform_2d(random)) * std::pow(10.0f, 20 * uniform(random) - 8));
+            places.push_back(o + sample_sphere(random.next_2d()) * std::pow(10.0f, 20 * random.next() - 8));
         }
         for (const float x : ends) {
             for (const float y : ends) {
@@ -60,14 +60,14 @@ TEST(LightRobustness, AnyReceiverAndAnyNumbers) {
         }
         for (const Vec3 place : places) {
             for (int i = 0; i < 20; ++i) {
-                const NextEvent e = sample_next_event(s.scene(), s.light, place, uniform_2d(random));
+                const NextEvent e = sample_next_event(s.scene(), s.light, place, random.next_2d());
                 ASSERT_TRUE(sane(e));
                 if (!e.valid()) continue;
                 const float pdf = pdf_next_event(s.scene(), s.light, place, e.position, e.normal, e.direction);
                 EXPECT_FALSE(std::isnan(pdf) || pdf < 0);
                 const EmissionPdf back = pdf_emission(s.scene(), s.light, e.position, e.normal, -e.direction);
                 EXPECT_FALSE(std::isnan(back.position * back.direction) || back.position * back.direction < 0);
-                hit_light(s, {place, sample_sphere(uniform_2d(random))});
+                hit_light(s, {place, sample_sphere(random.next_2d())});
             }
         }
     }
@@ -104,13 +104,13 @@ TEST(LightRobustness, ShearedAreaKeepsItsArea) {
 }
 
 TEST(LightChoice, WidthsAreExact) {
-    Random random(k_seed);
+    Random random{k_seed};
     for (const size_t count : {size_t{1}, size_t{2}, size_t{3}, size_t{1000}, size_t{200000}}) {
         for (int kind = 0; kind < 4; ++kind) {
             std::vector<double> weights(count, 1.0);
             for (size_t i = 0; i < count; ++i) {
-                if (kind == 1) weights[i] = std::pow(10.0, 60 * static_cast<double>(uniform(random)) - 30);
-                if (kind == 2) weights[i] = i % 2 ? 0 : static_cast<double>(uniform(random)) + 0.1;
+                if (kind == 1) weights[i] = std::pow(10.0, 60 * static_cast<double>(random.next()) - 30);
+                if (kind == 2) weights[i] = i % 2 ? 0 : static_cast<double>(random.next()) + 0.1;
                 if (kind == 3) weights[i] = 0;
             }
             const std::vector<uint32_t> below = make_distribution(weights);
@@ -136,15 +136,15 @@ TEST(LightChoice, WidthsAreExact) {
 
 // One lamp of 10,000 chosen at a time gives the sum over all of them, to 5 standard errors (6e-7).
 TEST(LightChoice, TenThousandLamps) {
-    Random random(k_seed);
+    Random random{k_seed};
     std::vector<Light> lights;
     std::vector<uint32_t> lamps;
     std::vector<double> powers;
     const Vec3 receiver{0, 0, -3};
     double truth = 0;
     for (uint32_t i = 0; i < 10000; ++i) {
-        const Vec3 p{10 * uniform(random) - 5, 10 * uniform(random) - 5, 10 * uniform(random)};
-        const float watts = std::exp(4 * uniform(random));
+        const Vec3 p{10 * random.next() - 5, 10 * random.next() - 5, 10 * random.next()};
+        const float watts = std::exp(4 * random.next());
         lights.push_back(make_point(p, rgb(watts), i % 2 ? 0.01f : 0.0f).value());
         powers.push_back(static_cast<double>(power(lights.back(), 10)));
         if (i % 2) lamps.push_back(i);
@@ -159,16 +159,16 @@ TEST(LightChoice, TenThousandLamps) {
     double sum = 0, squares = 0;
     constexpr int k_draws = 1000000;
     for (int i = 0; i < k_draws; ++i) {
-        const DiscreteSample choice = choose_light(scene, static_cast<uint32_t>(random()));
+        const DiscreteSample choice = choose_light(scene, hash(k_seed, static_cast<uint32_t>(i)));
         ASSERT_EQ(choice.pdf, pdf_choose_light(scene, choice.index));
-        const NextEvent e = sample_next_event(scene, lights[choice.index], receiver, uniform_2d(random));
+        const NextEvent e = sample_next_event(scene, lights[choice.index], receiver, random.next_2d());
         const double x = static_cast<double>(e.radiance.g * e.direction.z / (e.pdf_solid_angle * choice.pdf));
         sum += x, squares += x * x;
     }
     const double mean = sum / k_draws, error = std::sqrt((squares / k_draws - mean * mean) / k_draws);
     EXPECT_NEAR(mean, truth, 5 * error + 1e-4 * truth) << "seed " << k_seed;
     for (int i = 0; i < 100; ++i) {
-        const uint32_t target = lamps[random() % lamps.size()];
+        const uint32_t target = lamps[hash(k_seed, static_cast<uint32_t>(i)) % lamps.size()];
         bool found = false;
         const Ray ray{receiver, normalize(lights[target].position - receiver)};
         for_each_lamp_hit(scene, ray, [&](uint32_t light, float t, Vec3, Vec3) {
@@ -180,4 +180,4 @@ TEST(LightChoice, TenThousandLamps) {
 }
 
 }  // namespace
-}  // namespace vlp::test
+}  // namespace vlp::testing
