@@ -16,14 +16,14 @@ struct Light {
     uint32_t primitive = 0;
     Rgb radiance;                 // point and spot of radius 0: intensity (W/sr); sun of angle 0: irradiance (W/m²)
     Vec3 position;                // point, spot, area: centre; sphere: centre in world space; triangle: first vertex
-    Vec3 axis_u, axis_v;          // area: half edges; triangle: the two edges from the first vertex
-    Vec3 normal;                  // area, spot, sun: the direction of shining; triangle: unit geometric normal
-    float radius = 0;             // point, spot, sphere; sun: sine of half the disc's angle
-    float area = 0;               // of the emitting shape, one side (m²)
-    float cos_outer = -1;         // spot: cosine of half its size; sun: cosine of half the disc's angle
-    float blend = 0;              // spot
-    float spread = 0;             // area: see light/area.h
-    float spread_normalization = 1;
+    Vec3 axis_u, axis_v;  // area: half sides, orthogonal; triangle: edges from the first vertex; spot: spot.h
+    Vec3 normal;  // area, spot, sun: the direction of shining; triangle: unit geometric normal
+    float radius = 0;  // point, spot, sphere; sun: sine of half the disc's angle
+    float area = 0;  // of the emitting shape, one side (m²)
+    float cos_outer = -1;  // spot: cosine of half its size; sun: cosine of half the disc's angle
+    float blend = 0;  // spot
+    float spread = 0;  // area: cotangent of half its spread, 0: Lambertian
+    float spread_share = 1;  // area: of a Lambertian lamp's power, that the spread leaves
 };
 
 // Lamps with a shape (radius or area), found by rays but not blocking them.

@@ -63,9 +63,11 @@ struct SceneView {
     const Light* lights = nullptr;
     Distribution light_choice;    // over lights, by power
     uint32_t geometry_count = 0, instance_count = 0, light_count = 0;
-    uint32_t world_light = k_none;  // index of the environment among the lights; k_none: black
+    const uint32_t* infinite_lights = nullptr;  // indices of the environment and the suns that are no delta lights
+    uint32_t infinite_light_count = 0;
     BvhView bvh;                  // every surface
     LampView lamps;               // the shapes of lamps, which rays pass through
+    bool has_transparency = false;  // some material lets light pass straight through
     Camera camera;
     Vec3 center;                  // of the sphere around every surface and lamp
     float radius = 1;

@@ -1,20 +1,19 @@
 """Scenes as validated dataclasses of numpy arrays: what the add-on exports and the native core renders.
 
 Units are Blender's: metres, watts, radians, linear Rec. 709 colour. Matrices map column vectors, (3, 4) affine.
-Array fields accept anything that `numpy.asarray` does and are kept C-contiguous in the stated dtype.
+Array fields accept anything that `numpy.asarray` does and are kept C-contiguous in the stated dtype, without a copy
+where they are already; a wrong shape raises `SceneError`. `Scene.validate` checks what the values say.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from .errors import SceneError
+from . import _arrays
 
 Float32 = NDArray[np.float32]
 Int32 = NDArray[np.int32]
@@ -100,6 +99,17 @@ class Mesh:
     uvs: dict[str, Float32] = field(default_factory=dict)
     material_index: Int32 | None = None
 
+    def __post_init__(self) -> None:
+        where = f"mesh '{self.name}'"
+        self.positions = _arrays.float32(f"{where}: positions", self.positions, (None, 3))
+        self.triangles = _arrays.int32(f"{where}: triangles", self.triangles, (None, 3))
+        count = len(self.triangles)
+        if self.corner_normals is not None:
+            self.corner_normals = _arrays.float32(f"{where}: corner_normals", self.corner_normals, (count, 3, 3))
+        self.uvs = {name: _arrays.float32(f"{where}: uvs '{name}'", uv, (count, 3, 2)) for name, uv in self.uvs.items()}
+        if self.material_index is not None:
+            self.material_index = _arrays.int32(f"{where}: material_index", self.material_index, (count,))
+
 
 @dataclass
 class Spheres:
@@ -109,6 +119,13 @@ class Spheres:
     centers: Float32
     radii: Float32
     material_index: Int32 | None = None
+
+    def __post_init__(self) -> None:
+        where = f"spheres '{self.name}'"
+        self.centers = _arrays.float32(f"{where}: centers", self.centers, (None, 3))
+        self.radii = _arrays.float32(f"{where}: radii", self.radii, (len(self.centers),))
+        if self.material_index is not None:
+            self.material_index = _arrays.int32(f"{where}: material_index", self.material_index, (len(self.centers),))
 
 
 @dataclass
@@ -120,6 +137,9 @@ class Instance:
     transform: Float32 = field(default_factory=lambda: IDENTITY.copy())
     materials: tuple[int, ...] = (0,)
     visibility: Visibility = Visibility.ALL
+
+    def __post_init__(self) -> None:
+        self.transform = _arrays.float32(f"instance '{self.name}': transform", self.transform, (3, 4))
 
 
 @dataclass
@@ -148,6 +168,9 @@ class SpotLight:
     radius: float = 0.0
     visibility: Visibility = Visibility(0)
 
+    def __post_init__(self) -> None:
+        self.transform = _arrays.float32(f"spot light '{self.name}': transform", self.transform, (3, 4))
+
 
 @dataclass
 class SunLight:
@@ -159,6 +182,9 @@ class SunLight:
     irradiance: Rgb
     angle: float = 0.0
     visibility: Visibility = Visibility(0)
+
+    def __post_init__(self) -> None:
+        self.transform = _arrays.float32(f"sun light '{self.name}': transform", self.transform, (3, 4))
 
 
 @dataclass
@@ -176,6 +202,9 @@ class AreaLight:
     ellipse: bool = False
     spread: float = 3.141592653589793
     visibility: Visibility = Visibility(0)
+
+    def __post_init__(self) -> None:
+        self.transform = _arrays.float32(f"area light '{self.name}': transform", self.transform, (3, 4))
 
 
 Light = PointLight | SpotLight | SunLight | AreaLight
@@ -216,6 +245,9 @@ class Camera:
     aperture_radius: float = 0.0
     focus_distance: float = 1.0
 
+    def __post_init__(self) -> None:
+        self.transform = _arrays.float32(f"camera '{self.name}': transform", self.transform, (3, 4))
+
 
 @dataclass
 class Film:
@@ -227,15 +259,29 @@ class Film:
     window: tuple[int, int, int, int] | None = None
     transparent: bool = False
 
+    @property
+    def render_window(self) -> tuple[int, int, int, int]:
+        """The window, or the whole picture where none is set: (x, y, width, height)."""
+        return self.window if self.window is not None else (0, 0, self.width, self.height)
+
 
 @dataclass
 class Scene:
-    """Everything that a render needs. `validate` raises `SceneError` naming the datablock and the value."""
+    """Everything that a render needs. `camera` is None where there is none, which cannot be rendered."""
 
     geometries: list[Mesh | Spheres] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
     materials: list[Material] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     world: World = field(default_factory=World)
-    camera: Camera = field(default_factory=Camera)
+    camera: Camera | None = field(default_factory=Camera)
     film: Film = field(default_factory=Film)
+
+    def validate(self) -> list[str]:
+        """Checks every value; returns warnings about what is odd but can be rendered (albedo above 1, no light).
+
+        Raises SceneError naming the datablock, the field and the value for what cannot be rendered.
+        """
+        from .validation import validate
+
+        return validate(self)

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from enum import StrEnum
+from operator import index
+from typing import Any
+
+from .errors import SettingsError
 
 
 class Mode(StrEnum):
@@ -39,6 +46,47 @@ class Device(StrEnum):
     HYBRID = "HYBRID"
 
 
+@dataclass(frozen=True)
+class ModePreset:
+    """What a mode gives to the settings that are left at None, and the room that automatic `light_paths` may take.
+
+    light_vertices bounds N * L when N is chosen from the picture's size: a stored light vertex takes 64 bytes.
+    """
+
+    light_path_length: int
+    eye_path_length: int
+    vlp_connections: int
+    light_samples: int
+    weighting: Weighting
+    light_vertices: int
+
+
+MODE_PRESETS: dict[Mode, ModePreset] = {
+    Mode.PAPER: ModePreset(1, 5, 1, 1, Weighting.UNIFORM, light_vertices=1 << 23),
+    Mode.BALANCED: ModePreset(3, 8, 1, 1, Weighting.BALANCE, light_vertices=1 << 23),
+    Mode.REFERENCE: ModePreset(64, 64, 1, 1, Weighting.BALANCE, light_vertices=1 << 21),
+}
+
+# The least and the most that a number may be, both allowed.
+RANGES: dict[str, tuple[float, float]] = {
+    "samples": (1, 2**31 - 1),
+    "time_limit": (0.0, 1e9),
+    "light_path_length": (0, 64),
+    "eye_path_length": (1, 64),
+    "light_paths": (0, 2**26),
+    "vlp_connections": (0, 1024),
+    "light_samples": (0, 1024),
+    "filter_width": (0.01, 10.0),
+    "threads": (0, 1024),
+    "seed": (0, 2**32 - 1),
+}
+
+_ENUMS: dict[str, type[StrEnum]] = {"mode": Mode, "weighting": Weighting, "filter": Filter, "device": Device}
+_REALS = ("time_limit", "filter_width")
+# What a mode decides where it is None.
+FROM_MODE = ("light_path_length", "eye_path_length", "light_paths", "vlp_connections", "light_samples", "weighting")
+
+
 @dataclass
 class RenderSettings:
     """What to compute. A field left at None takes the value that `mode` gives it (see `resolved`).
@@ -63,3 +111,105 @@ class RenderSettings:
     device: Device = Device.AUTO
     threads: int = 0
     seed: int = 0
+
+    def validate(self) -> None:
+        """Brings every field to its type (enums from their names, integers from whole numbers).
+
+        Raises SettingsError naming the setting and the value that is not one of its values or out of its range.
+        """
+        for field in fields(self):
+            setattr(self, field.name, _checked(field.name, getattr(self, field.name)))
+
+    def resolved(self, width: int, height: int) -> ResolvedSettings:
+        """These settings with nothing left open, for a picture of width x height pixels at full resolution.
+
+        A border render has the same `light_paths` as the whole picture: crop changes the pixels, not N.
+        Raises SettingsError as `validate` does.
+        """
+        values = {field.name: _checked(field.name, getattr(self, field.name)) for field in fields(self)}
+        preset = MODE_PRESETS[values["mode"]]
+        for name in FROM_MODE:
+            if values[name] is None:
+                values[name] = getattr(preset, name, 0)
+        if values["light_paths"] == 0:
+            most = preset.light_vertices // max(values["light_path_length"], 1)
+            values["light_paths"] = max(min(width * height, most), 1)
+        return ResolvedSettings(**values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The settings as JSON values (enums by name) under their fixed names; None where the mode decides."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: str(value) if isinstance(value, StrEnum) else value for name, value in values.items()}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> RenderSettings:
+        """Settings from what `to_dict` gave; names left out keep their defaults.
+
+        Raises SettingsError for an unknown name, which it answers with the closest known one, or a bad value.
+        """
+        return RenderSettings(**{name: _checked(_known(name), value) for name, value in values.items()})
+
+    @classmethod
+    def from_strings(cls, values: Mapping[str, str]) -> RenderSettings:
+        """Settings from text, as typed after `--set`: numbers, enum names in any case, `auto` for what the mode gives.
+
+        Raises SettingsError as `from_dict` does.
+        """
+        return cls.from_dict({name: _parsed(_known(name), text) for name, text in values.items()})
+
+
+@dataclass
+class ResolvedSettings(RenderSettings):
+    """Settings with nothing left open: made by `RenderSettings.resolved`, taken by the native core."""
+
+    light_path_length: int = 1
+    eye_path_length: int = 1
+    light_paths: int = 1
+    vlp_connections: int = 1
+    light_samples: int = 1
+    weighting: Weighting = Weighting.BALANCE
+
+
+def _known(name: str) -> str:
+    names = [field.name for field in fields(RenderSettings)]
+    if name in names:
+        return name
+    close = difflib.get_close_matches(name.lower().replace("-", "_"), names, n=1)
+    hint = f"did you mean {close[0]}?" if close else f"known settings: {', '.join(names)}"
+    raise SettingsError(f"unknown setting '{name}': {hint}")
+
+
+def _parsed(name: str, text: str) -> Any:
+    text = text.strip()
+    if name in FROM_MODE and text.lower() in ("auto", "none"):
+        return None
+    if name in _ENUMS:
+        return text.upper()
+    try:
+        return float(text) if name in _REALS else int(text)
+    except ValueError:
+        kind = "a number" if name in _REALS else "a whole number"
+        raise SettingsError(f"{name} = '{text}': must be {kind}") from None
+
+
+def _checked(name: str, value: Any) -> Any:
+    """The value as the setting's type; raises SettingsError where it has no place there."""
+    if value is None and name in FROM_MODE:
+        return None
+    if name in _ENUMS:
+        try:
+            return _ENUMS[name](value)
+        except ValueError:
+            choices = ", ".join(_ENUMS[name])
+            raise SettingsError(f"{name} = {value!r}: must be one of {choices}") from None
+    low, high = RANGES[name]
+    try:
+        if isinstance(value, bool):
+            raise TypeError
+        number = float(value) if name in _REALS else index(value)
+    except (TypeError, ValueError):
+        kind = "a number" if name in _REALS else "a whole number"
+        raise SettingsError(f"{name} = {value!r}: must be {kind}") from None
+    if math.isnan(number) or not low <= number <= high:
+        raise SettingsError(f"{name} = {value!r}: must be from {low:.12g} to {high:.12g}")
+    return number

@@ -1,0 +1,163 @@
+// The CPU back end: both passes as parallel loops over paths and over tiles of pixels.
+#include <algorithm>
+#include <numeric>
+
+#include "backend/backend.h"
+#include "core/parallel.h"
+#include "integrator/light_tracing.h"
+#include "integrator/path_tracing.h"
+#include "scene/scene.h"
+
+namespace vlp {
+namespace {
+
+constexpr uint32_t k_paths_per_piece = 1024;
+constexpr uint32_t k_tile = 16;  // pixels a side
+
+// Memory for light vertices on cache-line boundaries, left uninitialised: the light pass writes every slot.
+struct AlignedDeleter {
+    void operator()(LightVertex* p) const { ::operator delete[](p, std::align_val_t{alignof(LightVertex)}); }
+};
+using LightVertexBuffer = std::unique_ptr<LightVertex[], AlignedDeleter>;
+
+LightVertexBuffer allocate_light_vertices(size_t count) {
+    return LightVertexBuffer(static_cast<LightVertex*>(
+        ::operator new[](count * sizeof(LightVertex), std::align_val_t{alignof(LightVertex)})));
+}
+
+// Every other bit of `code`, gathered: a coordinate of a Morton code.
+uint32_t compact_bits(uint32_t code) {
+    code &= 0x55555555u;
+    code = (code | (code >> 1)) & 0x33333333u;
+    code = (code | (code >> 2)) & 0x0f0f0f0fu;
+    code = (code | (code >> 4)) & 0x00ff00ffu;
+    return (code | (code >> 8)) & 0x0000ffffu;
+}
+
+struct Tile {
+    uint32_t x, y;  // in tiles
+};
+
+// Tiles along a Z-order curve: neighbours in time are neighbours in the picture.
+std::vector<Tile> tiles_in_morton_order(Window window) {
+    const uint32_t nx = (window.width + k_tile - 1) / k_tile, ny = (window.height + k_tile - 1) / k_tile;
+    uint32_t side = 1;
+    while (side < std::max(nx, ny)) side *= 2;
+    std::vector<Tile> tiles;
+    tiles.reserve(static_cast<size_t>(nx) * ny);
+    for (uint32_t code = 0; code < side * side; ++code) {
+        const Tile tile{compact_bits(code), compact_bits(code >> 1)};
+        if (tile.x < nx && tile.y < ny) tiles.push_back(tile);
+    }
+    return tiles;
+}
+
+class CpuBackend final : public Backend {
+public:
+    CpuBackend(const SceneView& scene, const PassSettings& pass, unsigned threads)
+        : scene_(scene), pass_(pass), pool_(threads) {
+        if (uses_virtual_light_points()) {
+            const size_t capacity = static_cast<size_t>(pass.light_paths) * pass.light_path_length;
+            slots_ = allocate_light_vertices(capacity);
+            stored_.resize(capacity);
+            stored_in_piece_.resize((pass.light_paths + k_paths_per_piece - 1) / k_paths_per_piece + 1);
+        }
+    }
+
+    bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
+        if (tiles_.empty()) tiles_ = tiles_in_morton_order(film.window());
+        const uint32_t pieces = stored_in_piece_.empty() ? 0 : static_cast<uint32_t>(stored_in_piece_.size()) - 1;
+        counters.work_done = 0;
+        counters.work_total = pieces + static_cast<uint32_t>(tiles_.size());
+
+        LightVertexCache cache;
+        if (pieces > 0) {
+            run_light_pass(iteration, stop);
+            if (stop) return false;
+            cache = {slots_.get(), stored_.data(), stored_in_piece_.back()};
+        }
+        counters.stored_vlps = cache.stored_count;
+
+        pool_.run(static_cast<uint32_t>(tiles_.size()), [&](uint32_t i) {
+            if (stop) return;
+            run_tile(iteration, film, cache, tiles_[i]);
+            counters.work_done.fetch_add(1, std::memory_order_relaxed);
+        });
+        if (stop) return false;
+        const uint32_t height = film.window().height, rows = 16;
+        pool_.run((height + rows - 1) / rows,
+                  [&](uint32_t i) { film.commit_rows(i * rows, std::min((i + 1) * rows, height)); });
+        film.count_iteration();
+        return true;
+    }
+
+    size_t bytes() const override {
+        return stored_.capacity() * (sizeof(LightVertex) + sizeof(uint32_t)) + tiles_.capacity() * sizeof(Tile);
+    }
+
+private:
+    bool uses_virtual_light_points() const {
+        return pass_.kappa > 0 && pass_.vlp_connections > 0 && pass_.light_path_length > 0 && pass_.light_paths > 0;
+    }
+
+    // Traces all light paths, then lists the slots that can be connected in the order of the slots.
+    void run_light_pass(uint32_t iteration, const std::atomic<bool>& stop) {
+        const uint32_t pieces = static_cast<uint32_t>(stored_in_piece_.size()) - 1;
+        pool_.run(pieces, [&](uint32_t piece) {
+            if (stop) return;
+            uint32_t stored = 0;
+            const uint32_t end = std::min((piece + 1) * k_paths_per_piece, pass_.light_paths);
+            for (uint32_t path = piece * k_paths_per_piece; path < end; ++path) {
+                LightVertex* slots = slots_.get() + static_cast<size_t>(path) * pass_.light_path_length;
+                stored += trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots);
+            }
+            stored_in_piece_[piece] = stored;
+            counters.work_done.fetch_add(1, std::memory_order_relaxed);
+        });
+        if (stop) return;
+        stored_in_piece_.back() = 0;
+        std::exclusive_scan(stored_in_piece_.begin(), stored_in_piece_.end(), stored_in_piece_.begin(), 0u);
+        pool_.run(pieces, [&](uint32_t piece) {
+            const uint32_t slots_per_piece = k_paths_per_piece * pass_.light_path_length;
+            const uint32_t end = std::min((piece + 1) * slots_per_piece, static_cast<uint32_t>(stored_.size()));
+            uint32_t next = stored_in_piece_[piece];
+            for (uint32_t slot = piece * slots_per_piece; slot < end; ++slot) {
+                if (slots_[slot].connectible()) stored_[next++] = slot;
+            }
+        });
+    }
+
+    void run_tile(uint32_t iteration, Film& film, const LightVertexCache& cache, Tile tile) {
+        const Window& window = film.window();
+        const uint32_t x_end = std::min((tile.x + 1) * k_tile, window.width);
+        const uint32_t y_end = std::min((tile.y + 1) * k_tile, window.height);
+        uint64_t dropped = 0;
+        for (uint32_t y = tile.y * k_tile; y < y_end; ++y) {
+            for (uint32_t x = tile.x * k_tile; x < x_end; ++x) {
+                PixelSink sink;
+                const float alpha =
+                    trace_eye_path(scene_, pass_, cache, iteration, window.x + x, window.y + y, sink);
+                dropped += sink.dropped;
+                const Rgb c = sink.radiance;
+                film.frame()[static_cast<size_t>(y) * window.width + x] = {{c.r, c.g, c.b, alpha}};
+            }
+        }
+        if (dropped > 0) counters.dropped.fetch_add(dropped, std::memory_order_relaxed);
+    }
+
+    SceneView scene_;
+    PassSettings pass_;
+    ThreadPool pool_;
+    LightVertexBuffer slots_;
+    std::vector<uint32_t> stored_;
+    std::vector<uint32_t> stored_in_piece_;  // first stored VLP of each piece, V last
+    std::vector<Tile> tiles_;
+};
+
+}  // namespace
+
+std::unique_ptr<Backend> make_cpu_backend(const Scene& scene, const PassSettings& pass, unsigned threads) {
+    return std::make_unique<CpuBackend>(scene.view(), pass, threads);
+}
+
+}  // namespace vlp

@@ -1,0 +1,138 @@
+// Python's Renderer, and the devices there are.
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+
+#include <stdexcept>
+
+#include "bindings/arrays.h"
+#include "bindings/bindings.h"
+#include "renderer/renderer.h"
+#include "scene/scene.h"
+
+namespace vlp {
+namespace {
+
+using Picture = nb::ndarray<float, nb::shape<-1, -1, 4>, nb::c_contig, nb::device::cpu>;
+using FilmState = nb::ndarray<const int64_t, nb::shape<-1, -1, 4, 2>, nb::c_contig, nb::device::cpu>;
+
+template <typename T>
+T get(const nb::dict& settings, const char* name) {
+    if (!settings.contains(name)) throw std::invalid_argument(std::string("setting '") + name + "' is missing");
+    return nb::cast<T>(settings[name]);
+}
+
+Weighting weighting_of(const std::string& name) {
+    if (name == "UNIFORM") return Weighting::uniform;
+    if (name == "BALANCE") return Weighting::balance;
+    if (name == "POWER") return Weighting::power;
+    throw std::invalid_argument("setting weighting: unknown value '" + name + "'");
+}
+
+Filter filter_of(const std::string& name) {
+    if (name == "BOX") return Filter::box;
+    if (name == "GAUSSIAN") return Filter::gaussian;
+    if (name == "BLACKMAN_HARRIS") return Filter::blackman_harris;
+    throw std::invalid_argument("setting filter: unknown value '" + name + "'");
+}
+
+PassSettings pass_of(const nb::dict& settings, bool transparent_film) {
+    PassSettings pass;
+    pass.light_path_length = get<uint32_t>(settings, "light_path_length");
+    pass.eye_path_length = get<uint32_t>(settings, "eye_path_length");
+    pass.light_paths = get<uint32_t>(settings, "light_paths");
+    pass.vlp_connections = get<uint32_t>(settings, "vlp_connections");
+    pass.light_samples = get<uint32_t>(settings, "light_samples");
+    pass.weighting = weighting_of(get<std::string>(settings, "weighting"));
+    pass.roulette = get<std::string>(settings, "mode") == "REFERENCE";
+    pass.transparent_film = transparent_film;
+    pass.seed = get<uint32_t>(settings, "seed");
+    pass.filter = filter_of(get<std::string>(settings, "filter"));
+    pass.filter_width = get<float>(settings, "filter_width");
+    if (pass.light_path_length > k_max_walk || pass.eye_path_length > k_max_walk || pass.eye_path_length == 0) {
+        throw std::invalid_argument("settings light_path_length and eye_path_length must be at most 64");
+    }
+    if (static_cast<uint64_t>(pass.light_paths) * pass.light_path_length >= (1ull << 31)) {
+        throw std::invalid_argument("settings light_paths * light_path_length must be below 2^31");
+    }
+    return pass;
+}
+
+nb::object film_state(const Renderer& renderer) {
+    const auto sums = renderer.film().sums();
+    const Window& window = renderer.film().window();
+    auto* words = new int64_t[sums.size() * 2];
+    std::memcpy(words, sums.data(), sums.size_bytes());
+    nb::capsule owner(words, [](void* p) noexcept { delete[] static_cast<int64_t*>(p); });
+    return nb::cast(nb::ndarray<nb::numpy, int64_t>(words, {window.height, window.width, 4, 2}, owner));
+}
+
+void add_film_state(Renderer& renderer, FilmState state, uint64_t iterations) {
+    renderer.film().add({reinterpret_cast<const ExactSum*>(state.data()), state.size() / 2}, iterations);
+}
+
+nb::dict memory_of(const Renderer& renderer, const Scene& scene) {
+    nb::dict d;
+    d["geometry"] = scene.info().geometry_bytes;
+    d["bvh"] = scene.info().bvh_bytes;
+    d["lights"] = scene.info().light_bytes;
+    d["materials"] = scene.info().material_bytes;
+    d["film"] = renderer.film().bytes();
+    d["virtual_light_points"] = renderer.backend_bytes();
+    return d;
+}
+
+nb::list devices() {
+    nb::list all;
+    std::vector<DeviceInfo> found = {{"CPU", "CPU", 0}};
+    for (const DeviceInfo& gpu : cuda_devices()) found.push_back(gpu);
+    for (const DeviceInfo& device : found) {
+        nb::dict d;
+        d["name"] = device.name;
+        d["kind"] = device.kind;
+        d["memory"] = device.memory;
+        d["isa"] = device.kind == "CPU" ? VLP_ISA : "cuda";
+        all.append(d);
+    }
+    return all;
+}
+
+}  // namespace
+
+void bind_renderer(nb::module_& m) {
+    nb::class_<Renderer>(m, "Renderer")
+        .def("__init__",
+             [](Renderer* self, std::shared_ptr<Scene> scene, const nb::dict& settings) {
+                 const PassSettings pass = pass_of(settings, scene->transparent_film());
+                 const auto device = get<std::string>(settings, "device");
+                 const auto threads = get<uint32_t>(settings, "threads"), first = get<uint32_t>(settings, "iteration_begin");
+                 if (!scene->built()) throw std::runtime_error("scene: build() has not been called");
+                 nb::gil_scoped_release release;
+                 new (self) Renderer(scene, pass, device, threads, first);
+             })
+        .def("iterate", &Renderer::iterate, nb::arg("count"), nb::call_guard<nb::gil_scoped_release>())
+        .def("cancel", &Renderer::cancel)
+        .def("set_deadline", &Renderer::set_deadline, nb::arg("seconds"))
+        .def("progress", &Renderer::progress)
+        .def(
+            "read",
+            [](const Renderer& r, Picture out) {
+                const std::span<float> rgba(out.data(), out.size());
+                nb::gil_scoped_release release;
+                r.film().read(rgba);
+            },
+            nb::arg("out"))
+        .def("film_state", &film_state)
+        .def("add_film_state", &add_film_state, nb::arg("state"), nb::arg("iterations"))
+        .def("memory", [](const Renderer& r) { return memory_of(r, r.scene()); })
+        .def_prop_ro("iterations", [](const Renderer& r) { return r.film().iterations(); })
+        .def_prop_ro("vlps", [](const Renderer& r) { return r.counters().stored_vlps.load(); })
+        .def_prop_ro("dropped", [](const Renderer& r) { return r.counters().dropped.load(); })
+        .def_prop_ro("paths",
+                     [](const Renderer& r) {
+                         return r.film().iterations() * (r.film().window().pixel_count() + r.pass().light_paths);
+                     })
+        .def_prop_ro("kappa", [](const Renderer& r) { return r.pass().kappa; });
+    m.def("devices", &devices);
+}
+
+}  // namespace vlp

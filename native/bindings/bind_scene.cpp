@@ -1,0 +1,181 @@
+// Python's Scene: datablocks go in as numpy arrays; rays can be asked of it for tests.
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+
+#include <stdexcept>
+
+#include "bindings/arrays.h"
+#include "bindings/bindings.h"
+#include "bvh/traverse.h"
+#include "light/light_build.h"
+#include "scene/material_build.h"
+#include "scene/scene.h"
+
+namespace vlp {
+namespace {
+
+using Floats1 = Array<const float, 1>;
+using Floats2 = Array<const float, 2>;
+using Floats3 = Array<const float, 3>;
+using Ints1 = Array<const int32_t, 1>;
+using Ints2 = Array<const int32_t, 2>;
+
+bool add_lamp(Scene& scene, const std::optional<Light>& light, uint32_t visibility) {
+    if (light) scene.add_lamp(*light, visibility);
+    return light.has_value();
+}
+
+void require_built(const Scene& scene) {
+    if (!scene.built()) throw std::runtime_error("scene: build() has not been called");
+}
+
+template <typename T>
+nb::ndarray<nb::numpy, T, nb::ndim<1>> to_numpy(std::vector<T> values) {
+    auto* owned = new std::vector<T>(std::move(values));
+    nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+    return nb::ndarray<nb::numpy, T, nb::ndim<1>>(owned->data(), {owned->size()}, owner);
+}
+
+// Directions need not be of unit length: t counts in their length.
+nb::dict intersect_rays(const Scene& scene, Floats2 origins, Floats2 directions, Floats1 t_max) {
+    require_built(scene);
+    const auto o = span_of<Vec3>(origins), d = span_of<Vec3>(directions);
+    const size_t n = o.size();
+    std::vector<float> t(n), u(n), v(n);
+    std::vector<uint32_t> primitive(n), instance(n);
+    {
+        nb::gil_scoped_release release;
+        for (size_t i = 0; i < n; ++i) {
+            const Hit hit = closest_hit(scene.view(), {o[i], d[i], t_max.data()[i]}, {});
+            t[i] = hit.t, u[i] = hit.u, v[i] = hit.v, primitive[i] = hit.primitive, instance[i] = hit.instance;
+        }
+    }
+    nb::dict result;
+    result["t"] = to_numpy(std::move(t));
+    result["u"] = to_numpy(std::move(u));
+    result["v"] = to_numpy(std::move(v));
+    result["primitive"] = to_numpy(std::move(primitive));
+    result["instance"] = to_numpy(std::move(instance));
+    return result;
+}
+
+nb::ndarray<nb::numpy, uint8_t, nb::ndim<1>> occluded_rays(const Scene& scene, Floats2 origins, Floats2 directions,
+                                                      Floats1 t_max) {
+    require_built(scene);
+    const auto o = span_of<Vec3>(origins), d = span_of<Vec3>(directions);
+    std::vector<uint8_t> blocked(o.size());
+    {
+        nb::gil_scoped_release release;
+        for (size_t i = 0; i < o.size(); ++i) {
+            blocked[i] = any_hit(scene.view(), {o[i], d[i], t_max.data()[i]}, {}, {}) ? 1 : 0;
+        }
+    }
+    return to_numpy(std::move(blocked));
+}
+
+nb::dict info_of(const Scene& scene) {
+    const Scene::Info& info = scene.info();
+    nb::dict bytes, d;
+    bytes["geometry"] = info.geometry_bytes;
+    bytes["bvh"] = info.bvh_bytes;
+    bytes["lights"] = info.light_bytes;
+    bytes["materials"] = info.material_bytes;
+    d["triangles"] = info.triangles;
+    d["spheres"] = info.spheres;
+    d["instances"] = info.instances;
+    d["lights"] = info.lamps;
+    d["emitters"] = info.emitters;
+    d["bytes"] = bytes;
+    d["build_seconds"] = info.build_seconds;
+    return d;
+}
+
+}  // namespace
+
+void bind_scene(nb::module_& m) {
+    nb::class_<Scene>(m, "Scene")
+        .def(nb::init<>())
+        .def(
+            "add_mesh",
+            [](Scene& s, Floats2 positions, Ints2 triangles, std::optional<Floats3> corner_normals,
+               std::optional<Floats3> uvs, std::optional<Ints1> material_index) {
+                return s.add_mesh(span_of<Vec3>(positions), span_of<Triangle>(triangles), span_of<Vec3>(corner_normals),
+                                  span_of<Vec2>(uvs), span_of<int32_t>(material_index));
+            },
+            nb::arg("positions"), nb::arg("triangles"), nb::arg("corner_normals").none(), nb::arg("uvs").none(),
+            nb::arg("material_index").none())
+        .def(
+            "add_spheres",
+            [](Scene& s, Floats2 centers, Floats1 radii, std::optional<Ints1> material_index) {
+                return s.add_spheres(span_of<Vec3>(centers), span_of<float>(radii), span_of<int32_t>(material_index));
+            },
+            nb::arg("centers"), nb::arg("radii"), nb::arg("material_index").none())
+        .def("add_material",
+             [](Scene& s, Ints1 kinds, Ints1 fresnels, Floats2 weights, Floats1 roughness, Floats1 ior, Floats2 f0,
+                Floats2 f82, Ints1 layered_under, Ints1 compensate, Triple emission) {
+                 std::vector<LobeInput> inputs(kinds.size());
+                 for (size_t i = 0; i < inputs.size(); ++i) {
+                     inputs[i] = {static_cast<LobeKind>(kinds.data()[i]),
+                                  static_cast<Fresnel>(fresnels.data()[i]),
+                                  span_of<Rgb>(weights)[i],
+                                  roughness.data()[i],
+                                  ior.data()[i],
+                                  span_of<Rgb>(f0)[i],
+                                  span_of<Rgb>(f82)[i],
+                                  layered_under.data()[i],
+                                  compensate.data()[i] != 0};
+                 }
+                 return s.add_material(inputs, rgb_of(emission));
+             })
+        .def("add_instance",
+             [](Scene& s, uint32_t geometry, FloatMatrix transform, Ints1 materials, uint32_t visibility) {
+                 s.add_instance(geometry, affine_of(transform), span_of<int32_t>(materials), visibility);
+             })
+        .def("add_point_light",
+             [](Scene& s, Triple position, Triple power, float radius, uint32_t visibility) {
+                 return add_lamp(s, make_point(vec3_of(position), rgb_of(power), radius), visibility);
+             })
+        .def("add_spot_light",
+             [](Scene& s, FloatMatrix transform, Triple power, float spot_size, float blend, float radius,
+                uint32_t visibility) {
+                 return add_lamp(s, make_spot(affine_of(transform), rgb_of(power), spot_size, blend, radius),
+                                 visibility);
+             })
+        .def("add_sun_light",
+             [](Scene& s, FloatMatrix transform, Triple irradiance, float angle, uint32_t visibility) {
+                 return add_lamp(s, make_sun(affine_of(transform), rgb_of(irradiance), angle), visibility);
+             })
+        .def("add_area_light",
+             [](Scene& s, FloatMatrix transform, Triple power, float size_x, float size_y, bool ellipse, float spread,
+                uint32_t visibility) {
+                 return add_lamp(s, make_area(affine_of(transform), rgb_of(power), size_x, size_y, ellipse, spread),
+                                 visibility);
+             })
+        .def("set_world", [](Scene& s, Triple radiance) { s.set_world(rgb_of(radiance)); })
+        .def("set_camera",
+             [](Scene& s, FloatMatrix transform, int projection, float half_width, float half_height, float shift_x,
+                float shift_y, float clip_start, float clip_end, float aperture_radius, float focus_distance) {
+                 Camera camera;
+                 camera.projection = static_cast<Projection>(projection);
+                 camera.camera_to_world = affine_of(transform);
+                 camera.half_size = {half_width, half_height};
+                 camera.shift = {shift_x, shift_y};
+                 camera.clip_start = clip_start;
+                 camera.clip_end = clip_end;
+                 camera.aperture_radius = aperture_radius;
+                 camera.focus_distance = focus_distance;
+                 s.set_camera(camera);
+             })
+        .def("set_film",
+             [](Scene& s, uint32_t width, uint32_t height, uint32_t x, uint32_t y, uint32_t window_width,
+                uint32_t window_height, bool transparent) {
+                 s.set_film(width, height, {x, y, window_width, window_height}, transparent);
+             })
+        .def("build", &Scene::build, nb::arg("threads") = 0, nb::call_guard<nb::gil_scoped_release>())
+        .def("intersect", &intersect_rays, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))
+        .def("occluded", &occluded_rays, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))
+        .def("info", &info_of);
+}
+
+}  // namespace vlp

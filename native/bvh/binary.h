@@ -1,0 +1,34 @@
+// A binary tree over boxes by the surface area heuristic, in bins (Wald 2007), built in parallel.
+#pragma once
+
+#include "bvh/refs.h"
+
+namespace vlp {
+
+inline constexpr uint32_t k_leaf_flag = 0x80000000u;
+
+// The node that cuts refs [begin, end) at `split` stands at index `split` of the array: every thread knows its places.
+struct BinaryNode {
+    Box box[2];
+    uint32_t child[2];  // index of a node; k_leaf_flag: a leaf
+    uint32_t begin, end;
+};
+
+struct BinaryTree {
+    std::vector<BinaryNode> nodes;
+    Box box;
+    uint32_t root = k_leaf_flag;  // of all refs
+};
+
+// What a leaf may hold and what things cost, in units of one step through a wide node.
+struct LeafRule {
+    uint32_t max_refs;
+    float block_cost;
+    const uint8_t* kind_of_instance;  // GeometryKind of the refs, by instance; null: all alike
+};
+
+// Sorts the refs so that every node's are neighbours. Below `max_depth` nodes are cut in halves, which bounds the depth.
+// The tree depends on the refs and their order alone, not on the number of threads.
+BinaryTree build_binary(std::vector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool);
+
+}  // namespace vlp

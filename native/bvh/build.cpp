@@ -1,0 +1,127 @@
+// The trees of instanced geometries first, then the world's over all the rest.
+#include "bvh/build.h"
+
+#include <stdexcept>
+#include <utility>
+
+#include "bvh/collapse.h"
+
+namespace vlp {
+
+namespace {
+
+constexpr uint32_t k_always_flatten = 4096;  // primitives of all placements together
+constexpr uint32_t k_small_geometry = 16384;  // primitives; such trees are built side by side, one thread each
+constexpr uint32_t k_tree_stack = k_stack_size / 2 - 1;  // the other half is for the tree of an instance
+
+WideTree build_tree(std::vector<Ref>& refs, const LeafSource& source, const uint8_t* kinds, ThreadPool& pool) {
+    if (refs.size() >= 1u << k_child_index_bits) throw std::length_error("Too many primitives for one scene");
+    const LeafRule rule{k_block_width * 2, 0.6f, kinds};
+    WideTree tree = collapse(build_binary(refs, rule, 64, pool), refs, source, false, pool);
+    if (tree.stack_need > k_tree_stack) {  // shapes whose sizes grow exponentially
+        tree = collapse(build_binary(refs, rule, 0, pool), refs, source, true, pool);
+    }
+    return tree;
+}
+
+// Which instances stand in the world's tree as primitives.
+std::vector<uint8_t> choose_flattened(std::span<const GeometryView> geometries, std::span<const InstanceView> instances) {
+    std::vector<uint32_t> placements(geometries.size());
+    for (const InstanceView& instance : instances) ++placements[instance.geometry];
+    std::vector<uint8_t> flattened(instances.size());
+    for (size_t i = 0; i < instances.size(); ++i) {
+        const uint32_t g = instances[i].geometry;
+        const bool worth_it = placements[g] == 1 || uint64_t{placements[g]} * geometries[g].primitive_count <= k_always_flatten;
+        flattened[i] = worth_it && can_flatten(geometries[g], instances[i]);
+    }
+    return flattened;
+}
+
+// Trees of the geometries that some instance keeps apart.
+std::vector<WideTree> build_geometry_trees(std::span<const GeometryView> geometries,
+                                           std::span<const InstanceView> instances,
+                                           const std::vector<uint8_t>& flattened, ThreadPool& pool) {
+    std::vector<uint8_t> wanted(geometries.size());
+    for (size_t i = 0; i < instances.size(); ++i) wanted[instances[i].geometry] |= !flattened[i];
+    std::vector<WideTree> trees(geometries.size());
+    const auto build = [&](size_t g, ThreadPool& threads) {
+        std::vector<Ref> refs;
+        append_refs(geometries[g], nullptr, k_none, threads, refs);
+        trees[g] = build_tree(refs, {geometries, instances, &geometries[g]}, nullptr, threads);
+    };
+    const auto is_small = [&](size_t g) { return geometries[g].primitive_count < k_small_geometry; };
+    pool.run(static_cast<uint32_t>(geometries.size()), [&](uint32_t g) {
+        ThreadPool alone(1);
+        if (wanted[g] && is_small(g)) build(g, alone);
+    });
+    for (size_t g = 0; g < geometries.size(); ++g) {
+        if (wanted[g] && !is_small(g)) build(g, pool);
+    }
+    return trees;
+}
+
+// Of an instance: around the boxes of its tree's first level, which is tighter than around the root's box.
+Box instance_box(const WideTree& tree, const Affine& object_to_world) {
+    Box box;
+    const BvhNode& root = tree.nodes.front();
+    for (uint32_t i = 0; i < k_node_width; ++i) {
+        if (root.child[i] == k_none) continue;
+        const auto& b = root.bounds;
+        box.include(transform_box(object_to_world, {{b[0][i], b[1][i], b[2][i]}, {b[3][i], b[4][i], b[5][i]}}));
+    }
+    return box;
+}
+
+}  // namespace
+
+BvhView Bvh::view() const {
+    return {nodes.data(), triangle_blocks.data(), sphere_blocks.data(), instance_roots.data(), root};
+}
+
+size_t Bvh::bytes() const {
+    return nodes.size() * sizeof(BvhNode) + triangle_blocks.size() * sizeof(TriangleBlock) +
+           sphere_blocks.size() * sizeof(SphereBlock) + instance_roots.size() * sizeof(uint32_t);
+}
+
+Bvh build_bvh(std::span<const GeometryView> geometries, std::span<const InstanceView> instances, ThreadPool& pool) {
+    const std::vector<uint8_t> flattened = choose_flattened(geometries, instances);
+    std::vector<WideTree> trees = build_geometry_trees(geometries, instances, flattened, pool);
+    std::vector<Ref> refs;
+    std::vector<uint8_t> kinds(instances.size());
+    for (size_t i = 0; i < instances.size(); ++i) {
+        const InstanceView& instance = instances[i];
+        const GeometryView& geometry = geometries[instance.geometry];
+        kinds[i] = static_cast<uint8_t>(geometry.kind);
+        if (flattened[i]) {
+            append_refs(geometry, &instance, static_cast<uint32_t>(i), pool, refs);
+        } else if (!trees[instance.geometry].nodes.empty()) {
+            const Box box = instance_box(trees[instance.geometry], instance.object_to_world);
+            refs.push_back({box.low, static_cast<uint32_t>(i), box.high, k_none});
+        }
+    }
+    WideTree world = build_tree(refs, {geometries, instances, nullptr}, kinds.data(), pool);
+    Bvh bvh;
+    bvh.instance_roots.assign(instances.size(), k_none);
+    if (!world.nodes.empty()) {
+        bvh.root = 0;
+        bvh.low = world.box.low, bvh.high = world.box.high;
+    }
+    std::vector<uint32_t> roots(geometries.size(), k_none);
+    for (size_t g = 0; g < geometries.size(); ++g) {
+        if (!trees[g].nodes.empty()) roots[g] = append(world, trees[g]);
+        trees[g] = {};
+    }
+    if (world.nodes.size() >= 1u << k_child_index_bits || world.triangle_blocks.size() >= 1u << k_child_index_bits ||
+        world.sphere_blocks.size() >= 1u << k_child_index_bits) {
+        throw std::length_error("Too many primitives for one scene");
+    }
+    for (size_t i = 0; i < instances.size(); ++i) {
+        if (!flattened[i]) bvh.instance_roots[i] = roots[instances[i].geometry];
+    }
+    bvh.nodes = std::move(world.nodes);
+    bvh.triangle_blocks = std::move(world.triangle_blocks);
+    bvh.sphere_blocks = std::move(world.sphere_blocks);
+    return bvh;
+}
+
+}  // namespace vlp

@@ -1,0 +1,31 @@
+// From a binary tree to wide nodes (Wald, Benthin & Boulos 2008) with their leaves packed into blocks.
+#pragma once
+
+#include "bvh/binary.h"
+#include "bvh/layout.h"
+
+namespace vlp {
+
+struct WideTree {
+    std::vector<BvhNode> nodes;  // the root is the first; empty: no refs
+    std::vector<TriangleBlock> triangle_blocks;
+    std::vector<SphereBlock> sphere_blocks;
+    Box box;
+    uint32_t stack_need = 0;  // entries of the traversal's stack in the worst case
+};
+
+// Where the refs' primitives are: of the whole scene, or of one geometry (whose refs have no instance).
+struct LeafSource {
+    std::span<const GeometryView> geometries;
+    std::span<const InstanceView> instances;
+    const GeometryView* geometry = nullptr;
+};
+
+// `balanced`: opens the child with the most refs instead of the largest one, which bounds the depth.
+WideTree collapse(const BinaryTree& tree, std::span<const Ref> refs, const LeafSource& source, bool balanced,
+                  ThreadPool& pool);
+
+// Appends `part` to `whole` and returns the index of its root there.
+uint32_t append(WideTree& whole, const WideTree& part);
+
+}  // namespace vlp

@@ -1,0 +1,66 @@
+// Blocks of structure-of-arrays primitives; lanes that stay empty hold NaN, which no ray meets.
+#include "bvh/pack.h"
+
+#include <limits>
+
+namespace vlp {
+
+namespace {
+
+constexpr float k_nan = std::numeric_limits<float>::quiet_NaN();
+
+void set_lane(TriangleBlock& block, uint32_t lane, const Corners& corners, const Ref& ref) {
+    for (uint32_t vertex = 0; vertex < 3; ++vertex) {
+        for (uint32_t axis = 0; axis < 3; ++axis) block.vertex[vertex][axis][lane] = (&corners.v[vertex].x)[axis];
+    }
+    block.instance[lane] = ref.instance, block.primitive[lane] = ref.primitive;
+}
+
+void set_lane(SphereBlock& block, uint32_t lane, const Sphere& sphere, const Ref& ref) {
+    for (uint32_t axis = 0; axis < 3; ++axis) block.center[axis][lane] = (&sphere.center.x)[axis];
+    block.radius[lane] = sphere.radius;
+    block.instance[lane] = ref.instance, block.primitive[lane] = ref.primitive;
+}
+
+}  // namespace
+
+uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree& out) {
+    const Ref& first = refs.front();
+    if (first.primitive == k_none) return make_child(ChildKind::instance, first.instance);
+    const auto geometry_of = [&](const Ref& ref) -> const GeometryView& {
+        return source.geometry ? *source.geometry : source.geometries[source.instances[ref.instance].geometry];
+    };
+    const auto placement_of = [&](const Ref& ref) {
+        return ref.instance == k_none ? nullptr : &source.instances[ref.instance];
+    };
+    const auto blocks = static_cast<uint32_t>((refs.size() + k_block_width - 1) / k_block_width);
+    if (geometry_of(first).kind == GeometryKind::mesh) {
+        const auto index = static_cast<uint32_t>(out.triangle_blocks.size());
+        out.triangle_blocks.resize(index + blocks);
+        for (uint32_t i = 0; i < blocks * k_block_width; ++i) {
+            TriangleBlock& block = out.triangle_blocks[index + i / k_block_width];
+            const Corners none{{{k_nan, k_nan, k_nan}, {k_nan, k_nan, k_nan}, {k_nan, k_nan, k_nan}}};
+            if (i >= refs.size()) {
+                set_lane(block, i % k_block_width, none, Ref{{}, k_none, {}, k_none});
+            } else {
+                const Ref& ref = refs[i];
+                set_lane(block, i % k_block_width, corners_of(geometry_of(ref), placement_of(ref), ref.primitive), ref);
+            }
+        }
+        return make_child(ChildKind::triangles, index, blocks);
+    }
+    const auto index = static_cast<uint32_t>(out.sphere_blocks.size());
+    out.sphere_blocks.resize(index + blocks);
+    for (uint32_t i = 0; i < blocks * k_block_width; ++i) {
+        SphereBlock& block = out.sphere_blocks[index + i / k_block_width];
+        if (i >= refs.size()) {
+            set_lane(block, i % k_block_width, Sphere{{}, k_nan}, Ref{{}, k_none, {}, k_none});
+        } else {
+            const Ref& ref = refs[i];
+            set_lane(block, i % k_block_width, sphere_of(geometry_of(ref), placement_of(ref), ref.primitive), ref);
+        }
+    }
+    return make_child(ChildKind::spheres, index, blocks);
+}
+
+}  // namespace vlp

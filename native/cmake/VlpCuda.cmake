@@ -1,0 +1,58 @@
+# Finds a CUDA compiler and builds backend/*.cu as the library vlp_cuda; sets VLP_HAS_CUDA.
+set(VLP_HAS_CUDA FALSE)
+if(VLP_CUDA STREQUAL "OFF")
+  return()
+endif()
+set(VLP_CUDA_ROOT "" CACHE PATH "CUDA toolkit to use; empty: CUDA_HOME, PATH, then the PyPI packages nvidia-cuda-* beside Python")
+set(VLP_CUDA_LIBRARY "" CACHE FILEPATH "A libvlp_cuda.a to use instead of compiling: a release compiles it once for several Pythons")
+
+# The CUDA runtime is linked statically. (FindCUDAToolkit is of no use: it wants libcudart.so, which the PyPI packages lack.)
+function(vlp_link_cuda_runtime root)
+  find_library(VLP_CUDART cudart_static HINTS ${root} PATH_SUFFIXES lib64 lib targets/x86_64-linux/lib targets/sbsa-linux/lib REQUIRED)
+  cmake_path(GET VLP_CUDART PARENT_PATH folder)
+  target_link_libraries(vlp_cuda INTERFACE ${VLP_CUDART} Threads::Threads ${CMAKE_DL_LIBS} $<$<PLATFORM_ID:Linux>:rt>)
+  target_link_directories(vlp_cuda INTERFACE ${folder})
+endfunction()
+
+if(VLP_CUDA_LIBRARY)
+  add_library(vlp_cuda STATIC IMPORTED)
+  set_target_properties(vlp_cuda PROPERTIES IMPORTED_LOCATION ${VLP_CUDA_LIBRARY})
+  vlp_link_cuda_runtime(${VLP_CUDA_ROOT})
+  set(VLP_HAS_CUDA TRUE)
+  return()
+endif()
+
+if(NOT CMAKE_CUDA_COMPILER)
+  find_program(CMAKE_CUDA_COMPILER nvcc HINTS ${VLP_CUDA_ROOT} ENV CUDA_HOME PATHS ${Python_SITELIB}/nvidia/cu13 PATH_SUFFIXES bin)
+endif()
+if(CMAKE_CUDA_COMPILER)
+  # The PyPI packages keep the libraries in lib, where nvcc does not look.
+  cmake_path(GET CMAKE_CUDA_COMPILER PARENT_PATH bin)
+  set(ENV{LIBRARY_PATH} "${bin}/../lib:$ENV{LIBRARY_PATH}")
+  include(CheckLanguage)
+  check_language(CUDA) # also that it works together with this C++ compiler
+endif()
+if(NOT CMAKE_CUDA_COMPILER)
+  if(VLP_CUDA STREQUAL "ON")
+    message(FATAL_ERROR "VLP_CUDA=ON, but no working nvcc: set CUDA_HOME or VLP_CUDA_ROOT, or install the PyPI packages of the group `cuda`")
+  endif()
+  message(STATUS "No CUDA compiler found: building without the GPU back end")
+  return()
+endif()
+
+set(CMAKE_CUDA_ARCHITECTURES ${VLP_CUDA_ARCHITECTURES})
+set(CMAKE_CUDA_STANDARD 20)
+set(CMAKE_CUDA_STANDARD_REQUIRED ON)
+set(CMAKE_CUDA_VISIBILITY_PRESET hidden)
+set(CMAKE_CUDA_RUNTIME_LIBRARY Static)
+enable_language(CUDA)
+
+# Compiled once for all instruction sets: what crosses this border must not depend on one.
+file(GLOB cuda_sources CONFIGURE_DEPENDS backend/*.cu)
+add_library(vlp_cuda STATIC ${cuda_sources})
+target_compile_options(vlp_cuda PRIVATE --expt-relaxed-constexpr --extended-lambda -lineinfo --threads=0
+  -Xcompiler=-fno-math-errno,-Wall $<$<BOOL:${VLP_WERROR}>:-Werror=all-warnings>)
+target_link_libraries(vlp_cuda PUBLIC vlp_options)
+vlp_link_cuda_runtime(${CMAKE_CUDA_COMPILER_TOOLKIT_ROOT})
+set(VLP_HAS_CUDA TRUE)
+message(STATUS "CUDA ${CMAKE_CUDA_COMPILER_VERSION}: ${CMAKE_CUDA_COMPILER}, architectures ${VLP_CUDA_ARCHITECTURES}")

@@ -1,0 +1,29 @@
+// Densities of a path's end on a light, in the measure that both walks and next event are compared in.
+#pragma once
+
+#include "light/light.h"
+#include "light/light_choice.h"
+
+namespace vlp {
+
+// The point y_0 of a light as seen from the next vertex x_1; `direction` is unit, from x_1 to the light.
+// Densities are per area of the light, or per solid angle when it is infinite; a delta light's are probabilities.
+struct LightEnd {
+    float pdf_emission = 0;    // of the light walk starting here
+    float pdf_next_event = 0;  // of next event from x_1 choosing it
+    float pdf_next = 0;        // of the light walk going on to x_1, per area of x_1 but for its cosine there
+};
+
+// `distance_squared` and `normal` (at y_0) are not looked at when the light is infinite.
+VLP_HD inline LightEnd light_end(const SceneView& scene, uint32_t light_index, Vec3 x_1, Vec3 y_0, Vec3 normal,
+                                 Vec3 direction, float dist_squared) {
+    const Light& light = scene.lights[light_index];
+    const float choice = pdf_choose_light(scene, light_index);
+    const EmissionPdf emission = pdf_emission(scene, light, y_0, normal, -direction);
+    const float next_event = is_delta(light) ? 1.0f : pdf_next_event(scene, light, x_1, y_0, normal, direction);
+    if (is_infinite(light)) return {choice * emission.direction, choice * next_event, emission.position};
+    const float per_area = is_delta(light) ? 1.0f : abs_dot(normal, direction) / dist_squared;
+    return {choice * emission.position, choice * next_event * per_area, emission.direction / dist_squared};
+}
+
+}  // namespace vlp

@@ -1,0 +1,110 @@
+// The light pass (the paper's Listing 2): a path from a light leaves virtual light points where it meets surfaces.
+#pragma once
+
+#include "bsdf/bsdf.h"
+#include "integrator/light_density.h"
+#include "integrator/trace.h"
+#include "integrator/weights.h"
+
+namespace vlp {
+
+// Traces light path `path` of an iteration into slots[0 ... L - 1], y_1 first; slots past its end are marked not valid.
+// Returns how many of them can be connected. `stream` keeps the pilot's paths apart from the render's.
+VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettings& pass, Stream stream, uint32_t iteration,
+                                        uint32_t path, LightVertex* slots) {
+    for (uint32_t i = 0; i < pass.light_path_length; ++i) slots[i].packed = 0;
+    if (scene.light_count == 0) return 0;
+
+    // The paths of an iteration are one stratified set.
+    const uint32_t seed = hash(pass.seed, stream, iteration);
+    Sampler sampler = make_sampler(seed, path);
+    const DiscreteSample choice = choose_light(scene, sampler.next_bits());
+    const Light& light = scene.lights[choice.index];
+    const Vec2 u_position = sampler.next_2d(), u_direction = sampler.next_2d();
+    const Emission emission = sample_emission(scene, light, u_position, u_direction);
+    const bool infinite = is_infinite(light);
+
+    Rgb throughput = emission.weight * (1.0f / choice.pdf);
+    if (is_black(throughput) || !is_finite(throughput)) return 0;
+    const Rgb emitted_throughput = throughput;
+
+    // y_0 as the weights see it. The end of a path at infinity is a direction: its density is per solid angle, and y_1
+    // has that of the disc around the scene that the light comes through.
+    Vec3 previous_position = emission.position, previous_normal = emission.normal;
+    float previous_pdf = choice.pdf * (infinite ? emission.pdf_direction : emission.pdf_position);
+    float pdf_solid_angle = emission.pdf_direction;
+    Ray ray{emission.position, emission.direction};
+    Anchor from{emission.position, emission.normal, {light.instance, light.primitive}};
+    if (light.instance != k_none) ray.origin = leave(from, ray.direction);
+
+    uint32_t connectible = 0;
+    for (uint32_t i = 1; i <= pass.light_path_length; ++i) {
+        const uint32_t key = hash(seed ^ path, k_transparency_stream, i);
+        const Step step = walk(scene, ray, from.id, false, key, [](const Ray&, Rgb) {});
+        if (!step.found) break;
+        throughput *= step.throughput;
+        const SurfacePoint& y = step.surface;
+        const Edge edge = edge_between(y.position, previous_position);
+        const float cos_here = abs_dot(y.geometric_normal, ray.direction);
+
+        LightVertex& vertex = slots[i - 1];
+        vertex.next_event_ratio = 0;
+        if (i == 1 && infinite) {
+            vertex.pdf_area = emission.pdf_position * cos_here;
+            vertex.rev_geometry = is_delta(light) ? 0.0f : 1.0f / previous_pdf;
+        } else {
+            const bool delta = i == 1 && is_delta(light);
+            vertex.pdf_area = pdf_solid_angle * cos_here / edge.dist_squared;
+            vertex.rev_geometry =
+                delta ? 0.0f : abs_dot(previous_normal, ray.direction) / (edge.dist_squared * previous_pdf);
+        }
+        if (!(vertex.pdf_area > 0) || !is_finite(vertex.pdf_area) || !is_finite(vertex.rev_geometry)) break;
+        if (i == 1) {
+            const LightEnd end = light_end(scene, choice.index, y.position, emission.position, emission.normal,
+                                           -ray.direction, edge.dist_squared);
+            vertex.next_event_ratio = end.pdf_emission > 0 ? end.pdf_next_event / end.pdf_emission : 0.0f;
+        }
+
+        const Material& material = scene.materials[y.material];
+        vertex.position = y.position;
+        vertex.geometric_normal = encode(y.geometric_normal);
+        vertex.shading_normal = encode(y.shading_normal);
+        vertex.to_previous = encode(-ray.direction);
+        vertex.throughput = throughput;
+        vertex.instance = y.instance;
+        vertex.primitive = y.primitive;
+        vertex.rev_ratio = 0;
+        vertex.packed = LightVertex::k_valid | (i << LightVertex::k_index_shift) | y.material;
+        if (material.has_finite) {  // Listing 2: save a VLP
+            vertex.packed |= LightVertex::k_connectible;
+            ++connectible;
+        }
+        if (i == pass.light_path_length) break;
+
+        // The next ray of Listing 2, off any kind of surface.
+        const Bsdf bsdf = make_bsdf(scene, y);
+        const float u_lobe = sampler.next();
+        const Vec2 u = sampler.next_2d();
+        const BsdfSample next = sample(bsdf, -ray.direction, Walk::light, u_lobe, u);
+        if (!next.valid()) break;
+        throughput *= next.weight;
+        if (pass.roulette) {
+            const float survive = min_of(1.0f, max_component(throughput) / max_component(emitted_throughput));
+            if (sampler.next() >= survive) break;
+            throughput *= 1.0f / survive;
+        }
+        if (is_black(throughput) || !is_finite(throughput)) break;
+        vertex.rev_ratio = next.pdf_rev_solid_angle * vertex.rev_geometry;
+        if (next.specular) vertex.packed |= LightVertex::k_specular;
+
+        previous_position = y.position;
+        previous_normal = y.geometric_normal;
+        previous_pdf = vertex.pdf_area;
+        pdf_solid_angle = next.pdf_solid_angle;
+        from = anchor_of(y);
+        ray = {leave(from, next.direction), next.direction};
+    }
+    return connectible;
+}
+
+}  // namespace vlp

@@ -1,0 +1,43 @@
+// What the two passes of an iteration are given: lengths, counts and the stream of random numbers.
+#pragma once
+
+#include "core/sampler.h"
+#include "film/filter.h"
+#include "integrator/path_vertex.h"
+#include "scene/scene_view.h"
+
+namespace vlp {
+
+// How the strategies that can make a path share it (Veach 1997, 9.2).
+enum class Weighting : uint8_t { uniform, balance, power };
+
+// Longest walk of either side, in surface hits.
+inline constexpr uint32_t k_max_walk = 64;
+
+struct PassSettings {
+    uint32_t light_path_length = 1;  // L: most surface hits of a light path, at most k_max_walk
+    uint32_t eye_path_length = 5;    // K: most surface hits of an eye path, at most k_max_walk
+    uint32_t light_paths = 0;        // N
+    uint32_t vlp_connections = 1;    // C
+    uint32_t light_samples = 1;      // S
+    Weighting weighting = Weighting::balance;
+    bool roulette = false;           // ends walks at random by their throughput instead of at a fixed length
+    bool transparent_film = false;   // the camera sees no background
+    uint32_t seed = 0;
+    float kappa = 0;                 // C N / V, V being what a pilot pass of the scene stored: how often a VLP is drawn
+    Filter filter = Filter::blackman_harris;
+    float filter_width = 1.5f;       // full width (pixels)
+};
+
+// The virtual light points of one iteration. Path p keeps its hits y1 ... yL in slots [p L, p L + L); `stored` lists the
+// slots that can be connected, in that order.
+struct LightVertexCache {
+    LightVertex* slots = nullptr;
+    const uint32_t* stored = nullptr;
+    uint32_t stored_count = 0;  // V
+};
+
+// The streams that a seed and an iteration hold apart; the dimension that each walk step starts from.
+enum Stream : uint32_t { k_light_stream = 1, k_eye_stream = 2, k_pilot_stream = 3, k_transparency_stream = 4 };
+
+}  // namespace vlp

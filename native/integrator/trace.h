@@ -1,0 +1,114 @@
+// Edges of paths: walking to the next surface and seeing whether two points are joined, both through transparent ones.
+#pragma once
+
+#include "bvh/traverse.h"
+#include "core/sampler.h"
+#include "geometry/surface.h"
+#include "scene/scene_view.h"
+
+namespace vlp {
+
+// Most transparent surfaces that one edge may cross; what lies behind more of them is dark.
+inline constexpr int k_max_transparent = 128;
+
+// The start of a ray or one end of a connection: a point of a surface, or free in space (id none, normal zero).
+struct Anchor {
+    Vec3 position;
+    Vec3 normal;  // geometric
+    PrimitiveId id;
+};
+
+VLP_HD inline Anchor anchor_of(const SurfacePoint& p) {
+    return {p.position, p.geometric_normal, {p.instance, p.primitive}};
+}
+
+// The origin of a ray that leaves `from` in `direction`.
+VLP_HD inline Vec3 leave(const Anchor& from, Vec3 direction) {
+    return offset_origin(from.position, face_toward(from.normal, direction));
+}
+
+// A step of a walk: the surface found, and what transparency along it did to the throughput.
+struct Step {
+    bool found = false;
+    SurfacePoint surface;
+    Rgb throughput = rgb(1);
+};
+
+// Follows a ray to the next surface that is not passed through. Whether a partly transparent surface is passed is decided
+// at random from `key`, so passing is no scattering: such a surface is no vertex of the path. `on_free_stretch(ray,
+// throughput)` is called for each stretch of the way, whose t_max is where it ends.
+template <typename F>
+VLP_HD inline Step walk(const SceneView& scene, Ray ray, PrimitiveId skip, bool from_camera, uint32_t key,
+                        F&& on_free_stretch) {
+    Step step;
+    const float t_end = ray.t_max;
+    float travelled = 0;
+    for (int i = 0; i < k_max_transparent; ++i) {
+        const Hit hit = closest_hit(scene, ray, skip);
+        Ray stretch = ray;
+        if (hit.found()) stretch.t_max = hit.t;
+        on_free_stretch(stretch, step.throughput);
+        if (!hit.found()) return step;
+        step.surface = surface_at(scene, ray, hit);
+        const Material& material = scene.materials[step.surface.material];
+        const bool hidden = from_camera && !(scene.instances[hit.instance].visibility & k_visible_to_camera);
+        if (!hidden && material.pass_through <= 0) {
+            step.found = true;
+            return step;
+        }
+        if (!hidden && unit_float(hash(key, static_cast<uint32_t>(i))) >= material.pass_through) {
+            step.throughput *= 1.0f / (1.0f - material.pass_through);
+            step.found = true;
+            return step;
+        }
+        if (!hidden) step.throughput *= material.transparency * (1.0f / material.pass_through);
+        travelled += hit.t;
+        ray.origin = leave(anchor_of(step.surface), ray.direction);
+        ray.t_max = t_end - travelled;
+        skip = {hit.instance, hit.primitive};
+    }
+    step.throughput = {};
+    return step;
+}
+
+// What passes through transparent surfaces on the way along `ray`; black when something blocks it.
+VLP_HD inline Rgb transmittance(const SceneView& scene, Ray ray, PrimitiveId from, PrimitiveId to) {
+    if (!scene.has_transparency) return any_hit(scene, ray, from, to) ? Rgb{} : rgb(1);
+    Rgb through = rgb(1);
+    PrimitiveId skip = from;
+    for (int i = 0; i < k_max_transparent; ++i) {
+        const Hit hit = closest_hit(scene, ray, skip);
+        if (!hit.found() || (hit.instance == to.instance && hit.primitive == to.primitive && hit.t > 0.999f * ray.t_max)) {
+            return through;
+        }
+        const SurfacePoint surface = surface_at(scene, ray, hit);
+        through *= scene.materials[surface.material].transparency;
+        if (is_black(through)) return through;
+        ray.origin = leave(anchor_of(surface), ray.direction);
+        ray.t_max -= hit.t;
+        skip = {hit.instance, hit.primitive};
+    }
+    return {};
+}
+
+// Geometry of a connection of two points, and what of the light between them gets through.
+struct Edge {
+    Vec3 direction;       // unit, from the first to the second
+    float dist_squared = 0;
+};
+
+VLP_HD inline Edge edge_between(Vec3 from, Vec3 to) {
+    const Vec3 d = to - from;
+    const float dist_squared = length_squared(d);
+    return {d * (1.0f / std::sqrt(dist_squared)), dist_squared};
+}
+
+// Transmittance between two points; their surfaces do not block.
+VLP_HD inline Rgb transmittance(const SceneView& scene, const Anchor& from, const Anchor& to, Vec3 direction) {
+    const Vec3 origin = leave(from, direction), target = leave(to, -direction);
+    const Vec3 d = target - origin;
+    const float distance = length(d);
+    return transmittance(scene, {origin, d * (1.0f / distance), distance}, from.id, to.id);
+}
+
+}  // namespace vlp

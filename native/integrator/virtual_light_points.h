@@ -1,0 +1,86 @@
+// Joining an eye vertex to a virtual light point: the second sum of the paper's (7), with (6) for the VLP's radiance.
+#pragma once
+
+#include "bsdf/bsdf.h"
+#include "integrator/trace.h"
+#include "integrator/weights.h"
+
+namespace vlp {
+
+// An eye walk: its vertices' densities from the lens z_0 on, and where it stands.
+struct EyeWalk {
+    VertexDensity vertices[k_max_walk + 1];
+    uint32_t t = 1;     // vertices so far, the lens counted
+    Rgb throughput = rgb(1);
+    SurfacePoint surface;  // z_{t-1}
+    Vec3 w_eye;            // unit, from z_{t-1} to z_{t-2}
+
+    VLP_HD VertexDensity& last() { return vertices[t - 1]; }
+    VLP_HD const VertexDensity& last() const { return vertices[t - 1]; }
+};
+
+// Light that strategy (s, t) found: its estimate without the weight, the weight, and the end of the path that the eye walk
+// does not hold.
+struct Contribution {
+    uint32_t s = 0, t = 0;
+    Rgb value{};
+    float weight = 0;
+    uint32_t light = k_none;           // s < 2: the light, and the point y_0 (the direction to it where it is infinite)
+    Vec3 position{}, normal{};
+    const LightVertex* vlp = nullptr;  // s >= 2: y_{s-1}
+};
+
+VLP_HD inline SurfacePoint surface_of(const LightVertex& vlp) {
+    SurfacePoint p{};
+    p.position = vlp.position;
+    p.geometric_normal = decode(vlp.geometric_normal);
+    p.shading_normal = decode(vlp.shading_normal);
+    p.material = vlp.material();
+    p.instance = vlp.instance;
+    p.primitive = vlp.primitive;
+    return p;
+}
+
+// The weight of joining z_{t-1} to a VLP by `edge`, which runs from the eye vertex; both BSDFs as evaluated along it.
+VLP_HD inline float connection_weight(const PassSettings& pass, const EyeWalk& eye, const LobeValue& at_eye,
+                                      const LightVertex* vlp, const LobeValue& at_vlp, const Edge& edge, float cos_eye,
+                                      float cos_vlp) {
+    const uint32_t s = vlp->index() + 1, n = s + eye.t;
+    StrategySum sum = strategy_sum(pass, s);
+    const float light_pdf = at_vlp.pdf_eye * cos_eye / edge.dist_squared;
+    add_longer_light_walks(sum, pass, eye.vertices, n, s + 1, light_pdf / eye.last().pdf_area,
+                           at_eye.pdf_eye * eye.last().rev_geometry);
+    const float eye_pdf = at_eye.pdf_light * cos_vlp / edge.dist_squared;
+    add_shorter_light_walks(sum, pass, vlp, s, n, eye_pdf / vlp->pdf_area, at_vlp.pdf_light * vlp->rev_geometry);
+    return sum.weight();
+}
+
+// Draws one of the V stored VLPs evenly and estimates what all of an iteration's bring to z_{t-1}; the caller averages
+// over its C draws. One draw stands for V VLPs of N paths.
+VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, const PassSettings& pass,
+                                                       const LightVertexCache& cache, const EyeWalk& eye,
+                                                       const Bsdf& eye_bsdf, uint32_t u) {
+    const uint64_t draw = (static_cast<uint64_t>(u) * cache.stored_count) >> 32;
+    const LightVertex* vlp = cache.slots + cache.stored[draw];
+    Contribution found{.s = vlp->index() + 1, .t = eye.t, .vlp = vlp};
+    const SurfacePoint point = surface_of(*vlp);
+    const Edge edge = edge_between(eye.surface.position, point.position);
+    const float cos_eye = abs_dot(eye.surface.geometric_normal, edge.direction);
+    const float cos_vlp = abs_dot(point.geometric_normal, edge.direction);
+    const float geometry = cos_eye * cos_vlp / edge.dist_squared;
+    if (!(geometry > 0) || !is_finite(geometry)) return found;
+
+    const LobeValue at_eye = evaluate(eye_bsdf, eye.w_eye, edge.direction);
+    if (is_black(at_eye.f)) return found;
+    const LobeValue at_vlp = evaluate(make_bsdf(scene, point), -edge.direction, decode(vlp->to_previous));
+    if (is_black(at_vlp.f)) return found;
+
+    const Rgb through = transmittance(scene, anchor_of(eye.surface), anchor_of(point), edge.direction);
+    if (is_black(through)) return found;
+    const float vlps_per_path = static_cast<float>(cache.stored_count) / static_cast<float>(pass.light_paths);
+    found.value = eye.throughput * at_eye.f * at_vlp.f * vlp->throughput * through * (geometry * vlps_per_path);
+    found.weight = connection_weight(pass, eye, at_eye, vlp, at_vlp, edge, cos_eye, cos_vlp);
+    return found;
+}
+
+}  // namespace vlp

@@ -1,0 +1,78 @@
+// Multiple importance weights within the window of path lengths that the passes can make.
+//
+// A path x_0 ... x_{n-1} runs from a light to the lens. Strategy k makes x_0 ... x_{k-1} by the light walk and the rest by
+// the eye walk; k = 0 hits the light, k = 1 is next event, k >= 2 joins an eye vertex to a virtual light point. It draws a
+// path with density
+//     p_k = count_k * prod_{i < k} light_i * prod_{i >= k} eye_i,
+// light_i and eye_i being the densities of x_i per area in the two walks. Neighbouring strategies differ in one vertex, so
+// p_{k+1} / p_k = count_{k+1} / count_k * light_k / eye_k, and the weights need only products of such ratios (Veach 1997,
+// 10.2). Strategies with k > L + 1 or n - k > K + 1 do not exist (the paper fixes lengths) and are left out, as are those
+// whose connection touches a delta distribution. Next event chooses x_0 by a density of its own: p_1 takes it for light_0.
+#pragma once
+
+#include "integrator/pass.h"
+#include "integrator/path_vertex.h"
+
+namespace vlp {
+
+// How often an iteration draws strategy k: hits once, S light samples, and kappa connections a virtual light point.
+VLP_HD inline float strategy_count(const PassSettings& pass, uint32_t k) {
+    return k == 0 ? 1.0f : k == 1 ? static_cast<float>(pass.light_samples) : pass.kappa;
+}
+
+// Sums what the other strategies have relative to the one at hand.
+struct StrategySum {
+    Weighting weighting;
+    float own_count;
+    float sum = 1;
+
+    // `ratio` = density of the other strategy over the density of this one, without the counts.
+    VLP_HD void add(float ratio, float count) {
+        const float relative = ratio * count / own_count;
+        switch (weighting) {
+            case Weighting::uniform: sum += relative > 0 ? 1.0f : 0.0f; break;
+            case Weighting::balance: sum += relative; break;
+            case Weighting::power: sum += relative * relative; break;
+        }
+    }
+    VLP_HD float weight() const { return 1.0f / sum; }
+};
+
+VLP_HD inline StrategySum strategy_sum(const PassSettings& pass, uint32_t k) {
+    return {pass.weighting, strategy_count(pass, k)};
+}
+
+// Adds strategies k_first, k_first + 1, ...: eye vertices become light vertices, from the light's end of the eye walk on.
+// `eye` holds z_0 ... z_{t-1} = x_{n-1} ... x_{n-t}; `ratio` is p_{k_first} over the density at hand without counts, and
+// `next_ratio` is light / eye density of x_{k_first}, which the connection at hand decides; further ones are in `eye`.
+VLP_HD inline void add_longer_light_walks(StrategySum& sum, const PassSettings& pass, const VertexDensity* eye, uint32_t n,
+                                          uint32_t k_first, float ratio, float next_ratio) {
+    // The lens is never joined to a light vertex, so an eye walk keeps z_0 and z_1.
+    for (uint32_t k = k_first; k <= pass.light_path_length + 1 && k + 2 <= n && ratio > 0; ++k) {
+        const VertexDensity &end = eye[n - 1 - k], &freed = eye[n - k];  // x_k and x_{k-1}
+        if (!end.specular && !freed.specular) sum.add(ratio, strategy_count(pass, k));
+        ratio *= k == k_first ? next_ratio : freed.rev_ratio;
+    }
+}
+
+// Adds strategies s - 1, s - 2, ..., 0: light vertices become eye vertices, from the virtual light point `vlp` = y_{s-1} back
+// to the light. `ratio` is eye / light density of the VLP and `next_ratio` of the vertex before it, as connected.
+VLP_HD inline void add_shorter_light_walks(StrategySum& sum, const PassSettings& pass, const LightVertex* vlp, uint32_t s,
+                                           uint32_t n, float ratio, float next_ratio) {
+    const LightVertex* freed = vlp;  // x_k = y_k, free of the light walk from strategy k on
+    for (uint32_t k = s - 1; n - k <= pass.eye_path_length + 1 && ratio > 0; --k, --freed) {
+        const bool finite = freed == vlp || !freed->specular();
+        if (k == 0) {
+            sum.add(ratio, strategy_count(pass, 0));
+            return;
+        }
+        if (k == 1) {
+            if (finite) sum.add(ratio * freed->next_event_ratio, strategy_count(pass, 1));
+        } else if (finite && !freed[-1].specular()) {
+            sum.add(ratio, strategy_count(pass, k));
+        }
+        ratio *= freed == vlp ? next_ratio : freed->rev_ratio;
+    }
+}
+
+}  // namespace vlp

@@ -1,0 +1,86 @@
+// The scene that owns its data: filled datablock by datablock, built once, then read by the passes as a SceneView.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "bvh/build.h"
+#include "core/parallel.h"
+#include "film/film.h"
+#include "scene/material_build.h"
+#include "scene/scene_view.h"
+
+namespace vlp {
+
+class Scene {
+public:
+    // Index of the new geometry. `corner_normals` (3 a triangle), `uvs` (3 a triangle) and `slots` may be empty.
+    uint32_t add_mesh(std::span<const Vec3> positions, std::span<const Triangle> triangles,
+                      std::span<const Vec3> corner_normals, std::span<const Vec2> uvs, std::span<const int32_t> slots);
+    uint32_t add_spheres(std::span<const Vec3> centers, std::span<const float> radii, std::span<const int32_t> slots);
+    // Index of the new material. Throws std::invalid_argument naming the lobe and the value at fault.
+    uint32_t add_material(std::span<const LobeInput> lobes, Rgb emission);
+    void add_instance(uint32_t geometry, const Affine& object_to_world, std::span<const int32_t> materials,
+                      uint32_t visibility);
+    void add_lamp(Light light, uint32_t visibility);
+    void set_world(Rgb radiance) { world_ = radiance; }
+    void set_camera(const Camera& camera) { camera_ = camera; }
+    void set_film(uint32_t width, uint32_t height, Window window, bool transparent);
+
+    // Builds the tree and the table of lights. Afterwards nothing may be added.
+    void build(unsigned threads);
+
+    const SceneView& view() const { return view_; }
+    // The same with every array where `place(data, bytes)` says that a copy of it stands: how a GPU gets the scene.
+    using Place = std::function<const void*(const void* data, size_t bytes)>;
+    SceneView view_placed(const Place& place) const;
+    const Window& window() const { return window_; }
+    bool transparent_film() const { return transparent_film_; }
+    bool built() const { return built_; }
+
+    struct Info {
+        uint64_t triangles = 0, spheres = 0, instances = 0, lamps = 0, emitters = 0;
+        uint64_t geometry_bytes = 0, bvh_bytes = 0, light_bytes = 0, material_bytes = 0;
+        double build_seconds = 0;
+    };
+    const Info& info() const { return info_; }
+
+private:
+    struct Geometry {
+        GeometryKind kind = GeometryKind::mesh;
+        std::vector<Vec3> positions;
+        std::vector<Triangle> triangles;
+        std::vector<OctNormal> corner_normals;
+        std::vector<Vec2> uvs;
+        std::vector<Sphere> spheres;
+        std::vector<uint16_t> slots;
+
+        GeometryView view(const Place& place) const;
+        size_t bytes() const;
+    };
+
+    void bound();
+    void collect_emitters();
+    void make_light_tables();
+    void add_emitters_of(uint32_t instance);
+
+    std::vector<Geometry> geometries_;
+    std::vector<InstanceView> instances_;
+    std::vector<Material> materials_;
+    std::vector<Lobe> lobes_;
+    std::vector<uint32_t> material_of_slot_, light_of_primitive_, light_choice_, lamps_, infinite_lights_;
+    std::vector<Light> lights_;
+    std::vector<GeometryView> geometry_views_;
+    Rgb world_;
+    Vec3 center_;
+    float radius_ = 1;
+    Camera camera_;
+    Window window_;
+    bool transparent_film_ = false, built_ = false;
+    Bvh bvh_;
+    SceneView view_;
+    Info info_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,310 @@
+"""Rendering a scene: upload, iterations with progress and cancellation, the picture and what it cost."""
+
+from __future__ import annotations
+
+import importlib
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import Cancelled, DeviceError, Error, SceneError
+from .images import Image
+from .scene import Scene
+from .settings import RenderSettings
+from .upload import upload
+
+_POLL_SECONDS = 0.05  # how often a running pass is asked about: cancelling takes no longer than this
+_REPORT_SECONDS = 0.2  # most time between two reports of progress, as far as iterations are that short
+
+
+class CancelFlag(Protocol):
+    """Anything with `is_set`, such as threading.Event."""
+
+    def is_set(self) -> bool: ...
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a render stands. iterations: complete ones; samples: how many it was asked for; fraction: 0 to 1, by
+    iterations or by time, whichever is further; seconds: so far; remaining: seconds, None until it can be told;
+    picture: an iteration was completed since the last report, so `Renderer.read` has something new without waiting."""
+
+    iterations: int
+    samples: int
+    fraction: float
+    seconds: float
+    remaining: float | None
+    picture: bool
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a render did and took. eye_samples and light_paths: in all; memory: bytes by part; dropped: non-finite
+    samples left out; build_seconds: uploading the scene and building its hierarchy."""
+
+    iterations: int
+    seconds: float
+    build_seconds: float
+    eye_samples: int
+    light_paths: int
+    vlps: int
+    dropped: int
+    memory: dict[str, int]
+
+    @property
+    def eye_samples_per_second(self) -> float:
+        return self.eye_samples / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def light_paths_per_second(self) -> float:
+        return self.light_paths / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def memory_bytes(self) -> int:
+        return sum(self.memory.values())
+
+
+class Renderer:
+    """Renders one scene with one set of settings, iteration after iteration.
+
+    Raises SceneError or SettingsError for what cannot be rendered, DeviceError when the device fails. `first_iteration`
+    begins a later range of the same render: ranges rendered apart merge to the picture that one render makes.
+    `warnings` holds those about the scene. Calls may come from any thread; `iterate` and `read` wait for each other.
+    """
+
+    def __init__(self, scene: Scene, settings: RenderSettings | None = None, *, first_iteration: int = 0) -> None:
+        self.warnings = scene.validate()
+        self.film = scene.film
+        self.settings = (settings or RenderSettings()).resolved(scene.film.width, scene.film.height)
+        self.first_iteration = first_iteration
+        if not 0 <= first_iteration < 2**31 - self.settings.samples:
+            raise SceneError(f"first_iteration {first_iteration} must be from 0 to {2**31 - self.settings.samples - 1}")
+        self.interrupted = False  # the last `render` was ended by KeyboardInterrupt
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._seconds = 0.0
+        self._rendered = 0  # iterations made here, without those of film states added
+        started = time.perf_counter()
+        native = load_native()
+        with native_errors():
+            self._scene = native.Scene()
+            upload(scene, self._scene)
+            self._scene.build(self.settings.threads)
+            options = self.settings.to_dict() | {"iteration_begin": first_iteration}
+            self._native = native.Renderer(self._scene, options)
+        self._build_seconds = time.perf_counter() - started
+
+    @property
+    def iterations(self) -> int:
+        """Complete iterations in the picture."""
+        return int(self._native.iterations)
+
+    @property
+    def iteration_fraction(self) -> float:
+        """How much of the iteration under way is done, 0 to 1."""
+        return float(self._native.progress())
+
+    @property
+    def statistics(self) -> Statistics:
+        """What was rendered so far and what it took."""
+        _, _, width, height = self.film.render_window
+        return Statistics(
+            iterations=self.iterations,
+            seconds=self._seconds,
+            build_seconds=self._build_seconds,
+            eye_samples=self._rendered * width * height,
+            light_paths=self._rendered * self.settings.light_paths,
+            vlps=int(self._native.vlps),
+            dropped=int(self._native.dropped),
+            memory={name: int(size) for name, size in self._native.memory().items()},
+        )
+
+    def iterate(self, count: int = 1, poll: Callable[[], bool] | None = None) -> int:
+        """Renders up to `count` further iterations and returns how many were completed.
+
+        While it runs, `poll` is called about 20 times a second on the calling thread; when it returns true, or after
+        `cancel`, the iteration under way is thrown away and this returns. An exception of `poll` and KeyboardInterrupt
+        stop it likewise and are raised on, so the picture stays that of the complete iterations.
+        """
+        self._stop.clear()
+        return self._iterate(count, poll)
+
+    def cancel(self) -> None:
+        """Makes the `iterate` or `render` that is running return, from any thread; the picture so far stays."""
+        self._stop.set()
+        self._native.cancel()
+
+    def render(self, progress: Callable[[Progress], None] | None = None, cancel: CancelFlag | None = None) -> Image:
+        """Renders `settings.samples` iterations, or fewer when `time_limit` ends them; returns the picture.
+
+        `progress` is called on the calling thread at least four times a second. Setting `cancel`, `cancel()` and
+        KeyboardInterrupt all end the render and keep its picture; one iteration is completed whatever the time limit.
+        Raises Cancelled when it was stopped before the first iteration was complete.
+        """
+        self._stop.clear()
+        self.interrupted = False
+        session = _Session(self, progress, cancel)
+        try:
+            session.run()
+        except KeyboardInterrupt:
+            self.interrupted = True
+        if self.iterations == 0:
+            raise Cancelled("render: cancelled before its first iteration was complete")
+        return Image(self.read(), self.metadata())
+
+    def read(self, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+        """The mean picture of the complete iterations: (height, width, 4) of the window, linear premultiplied RGBA
+        float32, row 0 at the bottom. Waits for an iteration under way. `out` takes the result where given."""
+        _, _, width, height = self.film.render_window
+        if out is None:
+            out = np.empty((height, width, 4), dtype=np.float32)
+        with self._lock, native_errors():
+            self._native.read(out)
+        return out
+
+    def film_state(self) -> NDArray[np.int64]:
+        """The exact sums behind the picture: (height, width, 4, 2) int64, 128-bit fixed point as low and high words."""
+        with self._lock, native_errors():
+            return np.asarray(self._native.film_state()).view(np.int64)
+
+    def add_film_state(self, state: NDArray[np.int64], iterations: int) -> None:
+        """Adds the sums of `iterations` iterations rendered elsewhere: exact, whatever the order."""
+        with self._lock, native_errors():
+            self._native.add_film_state(np.ascontiguousarray(state, dtype=np.int64), iterations)
+
+    def metadata(self) -> dict[str, Any]:
+        """What a file should say about the picture: settings, iterations and their ranges, seconds, film and so on."""
+        statistics = asdict(self.statistics)
+        return {
+            "settings": self.settings.to_dict(),
+            "iterations": self.iterations,
+            "ranges": [[self.first_iteration, self.first_iteration + self._rendered]],
+            "seconds": round(self._seconds, 3),
+            "seed": self.settings.seed,
+            "film": {"width": self.film.width, "height": self.film.height, "window": list(self.film.render_window)},
+            "statistics": {name: statistics[name] for name in ("eye_samples", "light_paths", "dropped")},
+        }
+
+    def _iterate(self, count: int, poll: Callable[[], bool] | None) -> int:
+        outcome: list[int | BaseException] = []
+
+        def work() -> None:
+            try:
+                outcome.append(int(self._native.iterate(count)))
+            except BaseException as error:  # handed to the caller's thread
+                outcome.append(error)
+
+        with self._lock:
+            started = time.perf_counter()
+            worker = threading.Thread(target=work, name="vlp-bpt", daemon=True)
+            worker.start()
+            try:
+                while True:
+                    worker.join(_POLL_SECONDS)
+                    if not worker.is_alive():
+                        break
+                    if poll is not None and poll():
+                        self._stop.set()
+                    if self._stop.is_set():
+                        self._native.cancel()  # again each time: it may have come before the pass began
+            finally:
+                while worker.is_alive():
+                    self._native.cancel()
+                    worker.join(_POLL_SECONDS)
+                self._seconds += time.perf_counter() - started
+                if outcome and isinstance(outcome[0], int):
+                    self._rendered += outcome[0]
+        result = outcome[0]
+        if isinstance(result, BaseException):
+            with native_errors():
+                raise result
+        return result
+
+
+class _Session:
+    """One call of `Renderer.render`: chunks of iterations short enough to report between them."""
+
+    def __init__(
+        self, renderer: Renderer, report: Callable[[Progress], None] | None, cancel: CancelFlag | None
+    ) -> None:
+        self.renderer, self.report, self.cancel = renderer, report, cancel
+        self.started = self.reported = time.perf_counter()
+        self.done = 0
+
+    def run(self) -> None:
+        renderer, settings = self.renderer, self.renderer.settings
+        chunk = 1
+        while self.done < settings.samples and not self._stopped():
+            if settings.time_limit > 0 and self.done > 0:
+                seconds = time.perf_counter() - self.started
+                # The last iteration may end as far after the limit as the one before it ended ahead of it.
+                left = settings.time_limit - seconds - 0.5 * seconds / self.done
+                if left <= 0:
+                    break
+                renderer._native.set_deadline(left)
+            asked = min(chunk, settings.samples - self.done)
+            began = time.perf_counter()
+            completed = renderer._iterate(asked, self._poll)
+            took = time.perf_counter() - began
+            self.done += completed
+            self._tell(picture=completed > 0)
+            if completed < asked:
+                break
+            chunk = max(1, min(2 * chunk, int(_REPORT_SECONDS / max(took / completed, 1e-6))))
+        renderer._native.set_deadline(0.0)
+
+    def _stopped(self) -> bool:
+        return self.renderer._stop.is_set() or (self.cancel is not None and self.cancel.is_set())
+
+    def _poll(self) -> bool:
+        if time.perf_counter() - self.reported >= _REPORT_SECONDS:
+            self._tell(picture=False)
+        return self._stopped()
+
+    def _tell(self, picture: bool) -> None:
+        if self.report is None:
+            return
+        settings = self.renderer.settings
+        self.reported = time.perf_counter()
+        seconds = self.reported - self.started
+        by_iterations = (self.done + (0.0 if picture else self.renderer.iteration_fraction)) / settings.samples
+        by_time = seconds / settings.time_limit if settings.time_limit > 0 else 0.0
+        fraction = min(max(by_iterations, by_time), 1.0)
+        remaining = seconds * (1 - fraction) / fraction if fraction > 0 else None
+        self.report(Progress(self.done, settings.samples, fraction, seconds, remaining, picture))
+
+
+def devices() -> list[dict[str, Any]]:
+    """The devices that can render here: name, kind ('CPU' or 'CUDA'), memory (bytes), isa. Raises DeviceError."""
+    native = load_native()
+    with native_errors():
+        return [dict(device) for device in native.devices()]
+
+
+def load_native() -> Any:
+    """The native core's module; raises DeviceError where it is not built or not made for this Python."""
+    try:
+        return importlib.import_module("vlp_bpt._native")
+    except ImportError as error:
+        raise DeviceError(f"the native core of VLP-BPT cannot be loaded: {error}") from error
+
+
+@contextmanager
+def native_errors() -> Iterator[None]:
+    """Turns what the native core raises into this package's errors."""
+    try:
+        yield
+    except Error:
+        raise
+    except (ValueError, TypeError, IndexError) as error:
+        raise SceneError(str(error)) from error
+    except MemoryError as error:
+        raise DeviceError(f"out of memory: {error}") from error
+    except RuntimeError as error:
+        raise DeviceError(str(error)) from error

@@ -1,0 +1,108 @@
+"""Hands a validated scene to the native core: the only place that knows the core's calls for geometry and lights."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .errors import SceneError
+from .scene import AreaLight, Camera, Film, Float32, Light, Material, Mesh, PointLight, Scene, Spheres, SpotLight
+
+
+def upload(scene: Scene, native_scene: Any) -> None:
+    """Fills an empty native scene; `scene` must have passed `validate`. Geometries without primitives are left out."""
+    geometries = [_add_geometry(geometry, native_scene) for geometry in scene.geometries]
+    for material in scene.materials:
+        _add_material(material, native_scene)
+    for instance in scene.instances:
+        geometry = geometries[instance.geometry]
+        if geometry is not None:
+            materials = np.asarray(instance.materials, dtype=np.int32)
+            native_scene.add_instance(geometry, instance.transform, materials, int(instance.visibility))
+    for light in scene.lights:
+        _add_light(light, native_scene)
+    native_scene.set_world(_rgb(scene.world.radiance))
+    if scene.camera is None:
+        raise SceneError("scene: has no camera")
+    _set_camera(scene.camera, native_scene)
+    _set_film(scene.film, native_scene)
+
+
+def _rgb(color: tuple[float, float, float]) -> tuple[float, float, float]:
+    r, g, b = color
+    return float(r), float(g), float(b)
+
+
+def _add_geometry(geometry: Mesh | Spheres, native_scene: Any) -> int | None:
+    if isinstance(geometry, Spheres):
+        if len(geometry.centers) == 0:
+            return None
+        return int(native_scene.add_spheres(geometry.centers, geometry.radii, geometry.material_index))
+    if len(geometry.triangles) == 0:
+        return None
+    uvs = next(iter(geometry.uvs.values()), None)
+    args = (geometry.positions, geometry.triangles, geometry.corner_normals, uvs, geometry.material_index)
+    return int(native_scene.add_mesh(*args))
+
+
+def _add_material(material: Material, native_scene: Any) -> None:
+    lobes = material.lobes
+
+    def numbers(name: str) -> Float32:
+        return np.array([getattr(lobe, name) for lobe in lobes], dtype=np.float32)
+
+    def colors(name: str) -> Float32:
+        return numbers(name).reshape(len(lobes), 3)
+
+    def integers(name: str) -> Any:
+        return np.array([int(getattr(lobe, name)) for lobe in lobes], dtype=np.int32)
+
+    native_scene.add_material(
+        integers("kind"),
+        integers("fresnel"),
+        colors("weight"),
+        numbers("roughness"),
+        numbers("ior"),
+        colors("f0"),
+        colors("f82"),
+        integers("layered_under"),
+        integers("compensate"),
+        _rgb(material.emission),
+    )
+
+
+def _add_light(light: Light, native_scene: Any) -> None:
+    visibility = int(light.visibility)
+    if isinstance(light, PointLight):
+        native_scene.add_point_light(_rgb(light.position), _rgb(light.power), float(light.radius), visibility)
+    elif isinstance(light, SpotLight):
+        cone = float(light.spot_size), float(light.blend)
+        native_scene.add_spot_light(light.transform, _rgb(light.power), *cone, float(light.radius), visibility)
+    elif isinstance(light, AreaLight):
+        size = float(light.size[0]), float(light.size[1])
+        shape = bool(light.ellipse), float(light.spread)
+        native_scene.add_area_light(light.transform, _rgb(light.power), *size, *shape, visibility)
+    else:
+        native_scene.add_sun_light(light.transform, _rgb(light.irradiance), float(light.angle), visibility)
+
+
+def _set_camera(camera: Camera, native_scene: Any) -> None:
+    transform = camera.transform.astype(np.float64)
+    transform[:, :3] /= np.linalg.norm(transform[:, :3], axis=0)  # Blender's cameras ignore scale
+    native_scene.set_camera(
+        transform.astype(np.float32),
+        int(camera.projection),
+        float(camera.half_width),
+        float(camera.half_height),
+        float(camera.shift[0]),
+        float(camera.shift[1]),
+        float(camera.clip_start),
+        float(camera.clip_end),
+        float(camera.aperture_radius),
+        float(camera.focus_distance),
+    )
+
+
+def _set_film(film: Film, native_scene: Any) -> None:
+    native_scene.set_film(film.width, film.height, *film.render_window, bool(film.transparent))
