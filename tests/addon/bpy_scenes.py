@@ -53,7 +53,7 @@ def material(name: str, *nodes: str) -> tuple[Any, list[Any]]:
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     added = [tree.nodes.new(node) for node in nodes]
-    if added:
+    if added and added[0].outputs:  # a group has none before its tree is set
         tree.links.new(added[0].outputs[0], output.inputs["Surface"])
     return made, added
 
