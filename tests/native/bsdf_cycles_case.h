@@ -6,7 +6,7 @@
 
 #include "scene/material_build.h"
 
-namespace vlp::testing {
+namespace vlp::test {
 
 // A plane seen at `cosine` with its normal: the light that it sends to the eye out of an environment of radiance 1 on the
 // eye's side alone, and on the far side alone.
@@ -21,4 +21,4 @@ struct CyclesCase {
     std::vector<CyclesView> views;
 };
 
-}  // namespace vlp::testing
+}  // namespace vlp::test

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-using namespace testing;
+using namespace test;
 
 struct Sides {
     Rgb near_side, far_side;

@@ -225,7 +225,7 @@ def main(path: Path) -> None:
         "",
         '#include "bsdf_cycles_case.h"',
         "",
-        "namespace vlp::testing {",
+        "namespace vlp::test {",
         "",
         f'inline constexpr const char* k_measured_with = "Blender {bpy.app.version_string}";',
         "",
@@ -235,7 +235,7 @@ def main(path: Path) -> None:
     for case in cases():
         assign(case)
         lines += rows(case)
-    lines += ["};", "// clang-format on", "", "}  // namespace vlp::testing", ""]
+    lines += ["};", "// clang-format on", "", "}  // namespace vlp::test", ""]
     path.write_text("\n".join(lines), encoding="utf-8")
 
 
