@@ -159,9 +159,16 @@ def _check_material(material: Material, warnings: list[str]) -> None:
     for i, lobe in enumerate(material.lobes):
         _check_lobe(f"{where}: lobe {i} ({LobeKind(lobe.kind).name})", lobe)
         _check_layers(f"{where}: lobe {i}", i, material.lobes)
-    total = np.sum([lobe.weight for lobe in material.lobes if lobe.layered_under < 0] or [(0.0, 0.0, 0.0)], axis=0)
-    if total.max() > 1.001:
-        warnings.append(f"{where}: lobe weights add up to {total.max():.4g}: it reflects more light than it receives")
+    albedos = [_albedo(lobe) for lobe in material.lobes if lobe.layered_under < 0]
+    total = float(np.max(np.sum(albedos, axis=0))) if albedos else 0.0
+    if total > 1.001:
+        warnings.append(f"{where}: its lobes' weights add up to {total:.4g}: it reflects more light than it receives")
+
+
+def _albedo(lobe: Lobe) -> NDArray[np.float64]:
+    """A bound of what the lobe scatters, per channel, where its own colours say so."""
+    colored = lobe.kind == LobeKind.REFLECTION and lobe.fresnel in (Fresnel.NONE, Fresnel.SCHLICK)
+    return np.multiply(lobe.weight, lobe.f0 if colored else (1.0, 1.0, 1.0))
 
 
 def _check_lobe(where: str, lobe: Lobe) -> None:
