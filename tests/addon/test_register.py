@@ -15,7 +15,7 @@ import addon
 from addon import preferences, properties
 from addon.export.settings import export_settings
 from addon.ui import reuse
-from vlp_bpt.settings import MODE_PRESETS, RANGES, Mode, RenderSettings
+from vlp_bpt.settings import MODE_PRESETS, RANGES, Device, Filter, Mode, RenderSettings, Weighting
 
 ROOT = Path(__file__).resolve().parents[2]
 
