@@ -36,15 +36,32 @@ def export_light(lamp: bpy.types.Object, matrix: Float32, visibility: Visibility
         return _area(name, data, matrix, strength, visibility, notes)
     transform = rigid(matrix)
     if data.type == "SUN":
-        radius = math.tan(min(data.angle, math.pi) / 2.0)
-        irradiance = strength if data.normalize or radius == 0 else _scaled(strength, math.pi * radius * radius)
-        return SunLight(name, transform, irradiance, data.angle, visibility)
+        return SunLight(name, transform, _sun_irradiance(data, strength), data.angle, visibility)
     radius = float(data.shadow_soft_size)
-    power = strength if data.normalize or radius == 0 else _scaled(strength, math.pi * radius * radius)
+    # Without normalization the strength is pi times the radiance of the sphere; Cycles has a point stand for 1/pi m².
+    area = 4.0 * math.pi * radius * radius if radius > 0 else 4.0
+    power = strength if data.normalize else _scaled(strength, area)
     if data.type == "SPOT":
-        return SpotLight(name, transform, power, data.spot_size, data.spot_blend, radius, visibility)
+        return SpotLight(name, transform, power, _cone(name, data, matrix, notes), data.spot_blend, radius, visibility)
     position = (float(matrix[0, 3]), float(matrix[1, 3]), float(matrix[2, 3]))
     return PointLight(name, position, power, radius, visibility)
+
+
+def _sun_irradiance(data: Any, strength: Rgb) -> Rgb:
+    """Without normalization the strength is the radiance of the sun's disc, which covers pi sin² of half its angle."""
+    if data.normalize or data.angle == 0:
+        return strength
+    return _scaled(strength, math.pi * math.sin(min(data.angle, math.pi) / 2.0) ** 2)
+
+
+def _cone(name: str, data: Any, matrix: Float32, notes: Notes) -> float:
+    """A spot's full angle: scaling it along its axis or across it makes the cone narrower or wider."""
+    x, y, z = np.linalg.norm(np.asarray(matrix, np.float64)[:, :3], axis=0)
+    if abs(x - y) > 1e-3 * x:
+        notes.warn(f"Light '{name}': a spot scaled to an ellipse is not there yet, its cone stays round")
+    if z <= 0 or math.isclose(math.sqrt(x * y), z, rel_tol=1e-5):
+        return float(data.spot_size)
+    return 2.0 * math.atan(math.tan(min(data.spot_size, math.pi) / 2.0) * math.sqrt(x * y) / z)
 
 
 def _area(

@@ -151,9 +151,11 @@ float power(const Light& light, float scene_radius) {
             watts = mean * cone * (light.radius > 0 ? k_pi_d * light.radius * light.radius : 1);
             break;
         }
-        case LightKind::sun:
-            watts = mean * disc * (light.radius > 0 ? k_pi_d * light.radius * light.radius : 1);
+        case LightKind::sun: {
+            const double solid_angle = 2 * k_pi_d * light.radius * light.radius / (1 + light.cos_outer);
+            watts = mean * disc * (light.radius > 0 ? solid_angle : 1);
             break;
+        }
         case LightKind::area:
             watts = mean * k_pi_d * light.area * light.spread_share;
             break;

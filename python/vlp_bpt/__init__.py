@@ -2,6 +2,7 @@
 
 from importlib import metadata as _metadata
 
+from . import render as _render
 from .errors import Cancelled, DeviceError, Error, ImageError, SceneError, SettingsError
 from .render import Renderer, Statistics, devices
 from .scene import Scene
@@ -26,7 +27,15 @@ __all__ = [
     "devices",
 ]
 
-try:
-    __version__ = _metadata.version("vlp_bpt")
-except _metadata.PackageNotFoundError:  # run from the source tree
-    __version__ = "0.0.0"
+
+def _version() -> str:
+    try:
+        return _metadata.version("vlp_bpt")
+    except _metadata.PackageNotFoundError:  # run from a folder: the core knows as well
+        try:
+            return str(_render.load_native().__version__)
+        except DeviceError:
+            return "0.0.0"
+
+
+__version__ = _version()

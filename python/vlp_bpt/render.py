@@ -85,6 +85,7 @@ class Renderer:
         self.first_iteration = first_iteration
         if not 0 <= first_iteration < 2**31 - self.settings.samples:
             raise SceneError(f"first_iteration {first_iteration} must be from 0 to {2**31 - self.settings.samples - 1}")
+        self.interrupted = False  # the last `render` was ended by KeyboardInterrupt
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._seconds = 0.0
@@ -147,12 +148,12 @@ class Renderer:
         Raises Cancelled when it was stopped before the first iteration was complete.
         """
         self._stop.clear()
+        self.interrupted = False
         session = _Session(self, progress, cancel)
         try:
             session.run()
         except KeyboardInterrupt:
-            if self.iterations == 0:
-                raise
+            self.interrupted = True
         if self.iterations == 0:
             raise Cancelled("render: cancelled before its first iteration was complete")
         return Image(self.read(), self.metadata())
@@ -178,16 +179,16 @@ class Renderer:
             self._native.add_film_state(np.ascontiguousarray(state, dtype=np.int64), iterations)
 
     def metadata(self) -> dict[str, Any]:
-        """What a file should say about the picture: settings, iterations, seconds, seed, range, statistics."""
+        """What a file should say about the picture: settings, iterations and their ranges, seconds, film and so on."""
         statistics = asdict(self.statistics)
         return {
             "settings": self.settings.to_dict(),
             "iterations": self.iterations,
-            "range": [self.first_iteration, self.first_iteration + self._rendered],
+            "ranges": [[self.first_iteration, self.first_iteration + self._rendered]],
             "seconds": round(self._seconds, 3),
             "seed": self.settings.seed,
             "film": {"width": self.film.width, "height": self.film.height, "window": list(self.film.render_window)},
-            "statistics": {name: statistics[name] for name in ("eye_samples", "light_paths", "vlps", "dropped")},
+            "statistics": {name: statistics[name] for name in ("eye_samples", "light_paths", "dropped")},
         }
 
     def _iterate(self, count: int, poll: Callable[[], bool] | None) -> int:
@@ -240,8 +241,10 @@ class _Session:
         renderer, settings = self.renderer, self.renderer.settings
         chunk = 1
         while self.done < settings.samples and not self._stopped():
-            left = settings.time_limit - (time.perf_counter() - self.started)
             if settings.time_limit > 0 and self.done > 0:
+                seconds = time.perf_counter() - self.started
+                # The last iteration may end as far after the limit as the one before it ended ahead of it.
+                left = settings.time_limit - seconds - 0.5 * seconds / self.done
                 if left <= 0:
                     break
                 renderer._native.set_deadline(left)

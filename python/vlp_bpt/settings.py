@@ -83,7 +83,8 @@ RANGES: dict[str, tuple[float, float]] = {
 
 _ENUMS: dict[str, type[StrEnum]] = {"mode": Mode, "weighting": Weighting, "filter": Filter, "device": Device}
 _REALS = ("time_limit", "filter_width")
-_FROM_MODE = ("light_path_length", "eye_path_length", "light_paths", "vlp_connections", "light_samples", "weighting")
+# What a mode decides where it is None.
+FROM_MODE = ("light_path_length", "eye_path_length", "light_paths", "vlp_connections", "light_samples", "weighting")
 
 
 @dataclass
@@ -127,7 +128,7 @@ class RenderSettings:
         """
         values = {field.name: _checked(field.name, getattr(self, field.name)) for field in fields(self)}
         preset = MODE_PRESETS[values["mode"]]
-        for name in _FROM_MODE:
+        for name in FROM_MODE:
             if values[name] is None:
                 values[name] = getattr(preset, name, 0)
         if values["light_paths"] == 0:
@@ -180,7 +181,7 @@ def _known(name: str) -> str:
 
 def _parsed(name: str, text: str) -> Any:
     text = text.strip()
-    if name in _FROM_MODE and text.lower() in ("auto", "none"):
+    if name in FROM_MODE and text.lower() in ("auto", "none"):
         return None
     if name in _ENUMS:
         return text.upper()
@@ -193,7 +194,7 @@ def _parsed(name: str, text: str) -> Any:
 
 def _checked(name: str, value: Any) -> Any:
     """The value as the setting's type; raises SettingsError where it has no place there."""
-    if value is None and name in _FROM_MODE:
+    if value is None and name in FROM_MODE:
         return None
     if name in _ENUMS:
         try:

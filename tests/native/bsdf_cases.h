@@ -76,10 +76,10 @@ inline std::vector<BsdfCase> finite_cases() {
         {"glass, diffuse and gold", {tinted_glass(0.3f, 1.6f), lobe_input(diffuse), gold(0.2f)}},
     };
     for (float roughness : {0.1f, 0.3f, 0.6f, 1.0f}) {
-        const std::string end = " " + std::to_string(roughness).substr(0, 3);
-        cases.push_back({"glossy" + end, {lobe_input(reflection, Fresnel::none, roughness)}});
-        cases.push_back({"glass" + end, {lobe_input(dielectric, Fresnel::dielectric, roughness, 1.5f)}});
-        cases.push_back({"refraction" + end, {lobe_input(refraction, Fresnel::none, roughness, 1.33f)}});
+        const std::string end = std::to_string(roughness).substr(0, 3);
+        cases.push_back({"glossy " + end, {lobe_input(reflection, Fresnel::none, roughness)}});
+        cases.push_back({"glass " + end, {lobe_input(dielectric, Fresnel::dielectric, roughness, 1.5f)}});
+        cases.push_back({"refraction " + end, {lobe_input(refraction, Fresnel::none, roughness, 1.33f)}});
     }
     cases.push_back({"bubble", {lobe_input(dielectric, Fresnel::dielectric, 0.4f, 1 / 1.5f)}});
     cases.push_back({"diamond", {lobe_input(dielectric, Fresnel::dielectric, 0.5f, 2.4f)}});

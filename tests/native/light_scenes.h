@@ -8,7 +8,7 @@
 #include "light/light.h"
 #include "light/light_build.h"
 
-namespace vlp::test {
+namespace vlp::testing {
 
 // Turned, so that no axis hides an error; `scale` along its own axes.
 inline Affine turned(Vec3 position, Vec3 scale = {1, 1, 1}) {
@@ -76,7 +76,8 @@ inline std::vector<LightScene> light_scenes() {
     s.emplace_back("sphere", make_sphere(o, 0.5f, k_power, 2, 5), 3 * 2 * pi * 4 * pi * 0.25);
     s.emplace_back("environment", make_environment(k_power), 3 * 4 * pi * disc);
     for (LightScene& l : s) {
-        if (l.light.kind == LightKind::sun) l.watts = 3 * disc;
+        // The disc that light comes through faces each ray, not the sun's axis: 2 / (1 + cos) times the irradiance.
+        if (l.light.kind == LightKind::sun) l.watts = 3 * disc * 2 / (1 + static_cast<double>(l.light.cos_outer));
     }
     return s;
 }
@@ -123,4 +124,4 @@ inline LightHit hit_light(LightScene& s, const Ray& ray) {
     return hit;
 }
 
-}  // namespace vlp::test
+}  // namespace vlp::testing
