@@ -40,7 +40,7 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
     uint32_t connectible = 0;
     for (uint32_t i = 1; i <= pass.light_path_length; ++i) {
         const uint32_t key = hash(seed ^ path, k_transparency_stream, i);
-        const Step step = walk(scene, ray, from.id, false, key, [](const Ray&, Rgb) {});
+        const Step step = walk(scene, ray, from.id, false, key, NoLights{});
         if (!step.found) break;
         throughput *= step.throughput;
         const SurfacePoint& y = step.surface;
