@@ -202,6 +202,25 @@ TEST(LightEmission, LightsADiscAsNextEventDoes) {
     }
 }
 
+// Smoothstep of the cosine within the blended share of the cone; a lamp stretched along its x has a cone so much wider.
+TEST(LightEmission, SpotsFallOffSmoothly) {
+    constexpr float k_size = 1.0f, k_blend = 0.5f;
+    const Light light = make_spot(Affine{}, k_power, k_size, k_blend, 0).value();
+    Affine stretch;
+    stretch.m[0][0] = 2;
+    const Light stretched = make_spot(stretch, k_power, k_size, k_blend, 0).value();
+    const float cos_outer = std::cos(0.5f * k_size);
+    for (const float x : {-0.1f, 0.1f, 0.25f, 0.5f, 0.9f, 1.1f}) {
+        const float c = cos_outer + x * k_blend * (1 - cos_outer), s = std::sqrt(1 - c * c);
+        const float expected = x <= 0 ? 0 : x >= 1 ? 1 : x * x * (3 - 2 * x);
+        for (const Vec3 d : {Vec3{s, 0, -c}, Vec3{0, -s, -c}}) EXPECT_NEAR(spot_falloff(light, d), expected, 2e-5f);
+        EXPECT_NEAR(spot_falloff(stretched, normalize(Vec3{2 * s, 0, -c})), expected, 2e-5f);
+        EXPECT_NEAR(spot_falloff(stretched, Vec3{0, s, -c}), expected, 2e-5f);
+    }
+    EXPECT_EQ(spot_falloff(light, {0, 0, 1}), 0);
+    EXPECT_NEAR(emitted(SceneView{}, light, {}, {}, {0, 0, -1}).r, 3 / (4 * k_pi), 1e-6f);
+}
+
 // Light paths don't start on the inner side of a lamp's sphere, though next event sees it.
 TEST(LightEmission, SphereLampsShineOutward) {
     for (LightScene& s : light_scenes()) {
