@@ -47,7 +47,6 @@ def export_scene(
         world=export_world(scene.world, notes),
     )
     _Objects(exported, notes).add_all(depsgraph)
-    _check_light(exported, notes)
     return exported
 
 
@@ -156,12 +155,6 @@ def is_singular(transforms: Float32) -> Any:
     with np.errstate(invalid="ignore", over="ignore"):
         volume = np.linalg.norm(linear, axis=1).prod(axis=1)
         return ~(np.abs(np.linalg.det(linear)) > 1e-7 * volume)
-
-
-def _check_light(scene: Scene, notes: Notes) -> None:
-    emits = any(max(material.emission) > 0 for material in scene.materials)
-    if not scene.lights and not emits and max(scene.world.radiance) == 0:
-        notes.warn("Nothing in the scene gives light: the picture will be black")
 
 
 __all__ = ["ExportError", "Notes", "export_scene"]

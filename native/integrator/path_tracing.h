@@ -8,9 +8,9 @@
 namespace vlp {
 
 // A light that the walk's ray met at y_0 = z_{t-1}, seen from the walk's last vertex z_{t-2} (strategy s = 0).
-VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye, Rgb throughput,
-                                     float pdf_solid_angle, uint32_t light_index, Vec3 position, Vec3 normal,
-                                     Vec3 direction) {
+VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye,
+                                     Rgb throughput, float pdf_solid_angle, uint32_t light_index, Vec3 position,
+                                     Vec3 normal, Vec3 direction) {
     const Light& light = scene.lights[light_index];
     const uint32_t t = eye.t + 1;
     Contribution c{.s = 0, .t = t, .value = throughput * emitted(scene, light, position, normal, -direction)};
@@ -20,14 +20,14 @@ VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings&
     c.normal = normal;
     if (is_black(c.value) || t == 2) return c;  // only the eye walk itself sees a light directly
 
-    const Vec3 x_1 = eye.surface.position;
-    const float dist_squared = length_squared(position - x_1);
+    const SurfacePoint& x_1 = eye.surface;
+    const float dist_squared = length_squared(position - x_1.position);
     const float eye_pdf =
         is_infinite(light) ? pdf_solid_angle : pdf_solid_angle * abs_dot(normal, direction) / dist_squared;
     const LightEnd end = light_end(scene, light_index, x_1, position, normal, direction, dist_squared);
     StrategySum sum = strategy_sum(pass, 0);
     if (!eye.last().specular) sum.add(end.pdf_next_event / eye_pdf, strategy_count(pass, 1));
-    const float cos_x_1 = abs_dot(eye.surface.geometric_normal, direction);
+    const float cos_x_1 = abs_dot(x_1.geometric_normal, direction);
     const float ratio = end.pdf_emission / eye_pdf * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
     add_longer_light_walks(sum, pass, eye.vertices, t, 2, ratio, eye.last().rev_ratio);
     c.weight = sum.weight();
@@ -40,17 +40,18 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
     Contribution found{.s = 1, .t = eye.t};
     const DiscreteSample choice = choose_light(scene, u_light);
     const Light& light = scene.lights[choice.index];
-    const Vec3 x_1 = eye.surface.position;
-    const NextEvent event = sample_next_event(scene, light, x_1, u);
+    const SurfacePoint& x_1 = eye.surface;
+    if (is_on_light(light, x_1)) return found;
+    const NextEvent event = sample_next_event(scene, light, x_1.position, u);
     if (!event.valid()) return found;
     found.light = choice.index;
     found.position = is_infinite(light) ? event.direction : event.position;
     found.normal = event.normal;
-    const float cos_x_1 = abs_dot(eye.surface.geometric_normal, event.direction);
+    const float cos_x_1 = abs_dot(x_1.geometric_normal, event.direction);
     const LobeValue at_x_1 = evaluate(bsdf, eye.w_eye, event.direction);
     if (!(cos_x_1 > 0) || is_black(at_x_1.f)) return found;
 
-    const Anchor from = anchor_of(eye.surface);
+    const Anchor from = anchor_of(x_1);
     const Rgb through =
         is_infinite(light)
             ? transmittance(scene, Ray{leave(from, event.direction), event.direction}, from.id, {})
@@ -121,7 +122,8 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         const uint32_t emitter = light_of_surface(scene, z.instance, z.primitive);
         if (emitter != k_none) {
             const Vec3 normal = face_toward(z.geometric_normal, -ray.direction);
-            sink.add(hit_light(scene, pass, eye, throughput, pdf_solid_angle, emitter, z.position, normal, ray.direction));
+            sink.add(
+                hit_light(scene, pass, eye, throughput, pdf_solid_angle, emitter, z.position, normal, ray.direction));
         } else if (!is_black(scene.materials[z.material].emission)) {  // an emitter that only hits can find
             sink.add({.s = 0, .t = eye.t + 1, .value = throughput * scene.materials[z.material].emission, .weight = 1});
         }

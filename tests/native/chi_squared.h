@@ -1,4 +1,4 @@
-// Chi-squared test of any sampler of directions against the density that it claims.
+// Chi-squared test of any sampler of directions against the density that it claims, narrow lobes included.
 //
 // Bins cover the whole sphere around an axis; what the sampler refuses is one more bin, which must hold what the
 // density leaves of 1. Use `family_threshold` to keep the chance of a false alarm over a whole family of tests.
@@ -6,54 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <functional>
 #include <optional>
 #include <vector>
 
 #include "core/frame.h"
-#include "core/rng.h"
+#include "goodness_of_fit.h"
 
-namespace vlp::testing {
-
-// Independent random numbers in [0, 1) of a seed: a counter through a hash.
-struct Random {
-    uint32_t seed = 0, counter = 0;
-
-    float next() { return static_cast<float>(hash(seed, counter++, 0x51ed270bu) >> 8) * 0x1p-24f; }
-    Vec2 next_2d() {
-        const float x = next();
-        return {x, next()};
-    }
-    Vec3 direction() {
-        const double z = 1.0 - 2.0 * next(), phi = 2.0 * 3.14159265358979323846 * next(), r = std::sqrt(1.0 - z * z);
-        return normalize({static_cast<float>(r * std::cos(phi)), static_cast<float>(r * std::sin(phi)),
-                          static_cast<float>(z)});
-    }
-};
-
-// The upper tail of the chi-squared distribution: the regularised incomplete gamma function Q(dof / 2, x / 2), by its
-// series below the mean and by Lentz's continued fraction above.
-inline double chi_squared_tail(double x, double dof) {
-    const double a = dof / 2, y = x / 2;
-    if (y <= 0) return 1;
-    const double front = std::exp(a * std::log(y) - y - std::lgamma(a));
-    if (y < a + 1) {
-        double term = 1 / a, sum = term;
-        for (double n = a + 1; term > 1e-16 * sum; ++n) sum += term *= y / n;
-        return 1 - front * sum;
-    }
-    double b = y + 1 - a, c = 1e300, d = 1 / b, fraction = d;
-    for (int i = 1; i < 100000; ++i) {
-        const double n = -i * (i - a);
-        b += 2;
-        d = 1 / (n * d + b);
-        c = b + n / c;
-        fraction *= c * d;
-        if (std::fabs(c * d - 1) < 1e-15) break;
-    }
-    return front * fraction;
-}
+namespace vlp::test {
 
 // The p below which one of `tests` independent tests fails, for a chance of `false_alarm` that any does (Sidak).
 inline double family_threshold(double false_alarm, size_t tests) {
@@ -92,7 +52,7 @@ inline ChiSquared compare_counts(const std::vector<double>& observed, const std:
 struct SphereBins {
     Vec3 axis{0, 0, 1};
     double width = 1e9;  // about (angle of the lobe)^2 / 2; large: equal steps of the cosine
-    int polar = 24, azimuthal = 36;
+    int polar = 12, azimuthal = 18;
 };
 
 class SphereGrid {
@@ -189,4 +149,4 @@ inline ChiSquared chi_squared(const std::function<std::optional<Vec3>()>& draw,
     return result;
 }
 
-}  // namespace vlp::testing
+}  // namespace vlp::test
