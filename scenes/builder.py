@@ -106,7 +106,7 @@ def block(name: str, low: Point, high: Point, material: bpy.types.Material) -> b
 
 
 def mesh_sphere(name: str, center: Point, radius: float, levels: int, material: bpy.types.Material) -> bpy.types.Object:
-    """A smooth sphere made by modifiers: a cube subdivided `levels` times (6 * 4**levels quads) and cast to a sphere."""
+    """A smooth sphere by modifiers: a cube subdivided `levels` times (6 * 4**levels quads) and cast to a sphere."""
     obj = block(name, (-1, -1, -1), (1, 1, 1), material)
     obj.data.polygons.foreach_set("use_smooth", [True] * 6)
     subdivide = obj.modifiers.new("Subdivide", "SUBSURF")

@@ -1,8 +1,8 @@
 """The Cornell box's measured spectra and their conversion to linear Rec. 709.
 
 Data: Cornell University Program of Computer Graphics, "Cornell Box Data"
-(https://www.graphics.cornell.edu/online/box/data.html). Colour matching functions: the multi-lobe fit of Wyman, Sloan and
-Shirley, "Simple Analytic Approximations to the CIE XYZ Color Matching Functions", JCGT 2 (2), 2013, equation 4.
+(https://www.graphics.cornell.edu/online/box/data.html). Colour matching functions: the multi-lobe fit of Wyman, Sloan
+and Shirley, "Simple Analytic Approximations to the CIE XYZ Color Matching Functions", JCGT 2 (2), 2013, equation 4.
 Illuminant D65: CIE, relative spectral power at steps of 10 nm.
 """
 
@@ -30,8 +30,8 @@ RED = (
 LIGHT = ((400.0, 500.0, 600.0, 700.0), (0.0, 8.0, 15.6, 18.4))  # nm, emission in the data's own unit
 
 D65 = (
-    "82.75 91.49 93.43 86.68 104.86 117.01 117.81 114.86 115.92 108.81 109.35 107.80 104.79 107.69 104.41 104.05 100.00 "
-    "96.33 95.79 88.69 90.01 89.60 87.70 83.29 83.70 80.03 80.21 82.28 78.28 69.72 71.61"
+    "82.75 91.49 93.43 86.68 104.86 117.01 117.81 114.86 115.92 108.81 109.35 107.80 104.79 107.69 104.41 104.05 "
+    "100.00 96.33 95.79 88.69 90.01 89.60 87.70 83.29 83.70 80.03 80.21 82.28 78.28 69.72 71.61"
 )
 XYZ_TO_RGB = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]

@@ -1,16 +1,18 @@
 """Statistical comparison of two rendered images: are their differences more than noise?
 
-Both images come as independent batches (n, h, w, c), renders of the same picture with different random numbers, from which
-their noise is measured. Two families of tests share the stated false-alarm rate:
+Both images come as independent batches (n, h, w, c), renders of the same picture with different random numbers, from
+which their noise is measured. Two families of tests share the stated false-alarm rate:
 
 - blocks: the means of 8 x 8 pixel blocks are equal (t-test with both variances);
 - regions: the means of a coarse grid of regions are equal within a tolerance, plus noise.
 
-Each family is Sidak-corrected for its number of tests. Student's t has the degrees of freedom of the smaller set of batches,
-which never raises more alarms than stated (Mickey and Brown 1966); Welch's, with unequal variances, does so far out in the
-tails, where the correction looks. The t-test assumes means of batches to be close to normal; blocks
-where one batch dominates (fireflies) must be rejected by their medians of means as well, so that the correction can only
-make a test stricter to fail, never raise false alarms, and if there are many such blocks the images are too noisy to judge.
+Each family is Sidak-corrected for its number of tests. Student's t has the degrees of freedom of the smaller set of
+batches, which never raises more alarms than stated (Mickey and Brown 1966); Welch's, with unequal variances, does so
+far out in the tails, where the correction looks.
+
+The t-test assumes means of batches to be close to normal. Blocks where one batch dominates (fireflies) must be rejected
+by their medians of means as well, which never raises false alarms; where there are many of them the images are too
+noisy to judge, and the comparison fails.
 """
 
 from __future__ import annotations
@@ -146,6 +148,8 @@ class Comparison:
     region_p: Array
     region_threshold: float
     region_error: Array
+    region_noise: Array
+    most_noise: float
     tolerance: float
 
     @property
@@ -162,20 +166,28 @@ class Comparison:
             result.append(
                 f"{self.heavy.mean():.1%} of the blocks are heavy-tailed, more than {self.most_heavy:.1%}: too noisy"
             )
+        if self.region_noise.max() > self.most_noise:
+            result.append(
+                f"the regions' relative standard error reaches {self.region_noise.max():.2%}, more than "
+                f"{self.most_noise:.2%}: too noisy"
+            )
         if (bad := self.region_p < self.region_threshold).any():
             worst = np.unravel_index(int(self.region_p.argmin()), self.region_p.shape)
             result.append(
-                f"{int(bad.sum())} of {bad.size} region means differ by more than {self.tolerance:.2%}; worst at region "
-                f"{tuple(map(int, worst))}: {self.region_error[worst]:+.2%}, p = {self.region_p.min():.2g}"
+                f"{int(bad.sum())} of {bad.size} region means differ by more than {self.tolerance:.2%}; worst at "
+                f"region {tuple(map(int, worst))}: {self.region_error[worst]:+.2%}, p = {self.region_p.min():.2g}"
             )
         return result
 
     def summary(self) -> str:
         """One line of figures."""
         return (
-            f"mean {self.ours.mean() / self.theirs.mean() - 1:+.3%}, regions within {np.abs(self.region_error).max():.3%}, "
+            f"mean {self.ours.mean() / self.theirs.mean() - 1:+.3%}, "
+            f"regions within {np.abs(self.region_error).max():.3%} "
+            f"(standard error up to {self.region_noise.max():.3%}), "
             f"smallest p: blocks {self.block_p.min():.2g} (threshold {self.block_threshold:.2g}), "
-            f"regions {self.region_p.min():.2g} ({self.region_threshold:.2g}), heavy-tailed blocks {self.heavy.mean():.2%}"
+            f"regions {self.region_p.min():.2g} ({self.region_threshold:.2g}), "
+            f"heavy-tailed blocks {self.heavy.mean():.2%}"
         )
 
 
@@ -189,15 +201,18 @@ def compare(
     regions: int = 4,
     blocks_equal: bool = True,
     most_heavy: float = 0.02,
+    most_noise: float = np.inf,
 ) -> Comparison:
     """Compare batches `ours` (n, h, w, c) with `theirs` (m, h, w, c), n and m at least 4.
 
     `tolerance` is relative and for the regions alone; with `blocks_equal` the blocks are tested too, without tolerance.
+    `most_heavy` is the largest share of heavy-tailed blocks, `most_noise` the largest relative standard error of a
+    region's difference, with which the images can be judged.
     """
     if min(len(ours), len(theirs)) < 4 or ours.shape[1:] != theirs.shape[1:]:
         raise ValueError(f"batches of shapes {ours.shape} and {theirs.shape} cannot be compared")
     a, b = np.asarray(ours, np.float64), np.asarray(theirs, np.float64)
-    h, w, c = a.shape[1:]
+    h, w = a.shape[1:3]
     share = false_alarm / 2 if blocks_equal else false_alarm
 
     cells = np.arange(0, h, block), np.arange(0, w, block)
@@ -212,6 +227,8 @@ def compare(
     reference = br.mean(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         error = np.where(reference != 0, ar.mean(axis=0) / reference - 1, 0.0)
+        spread = np.sqrt(ar.var(axis=0, ddof=1) / len(ar) + br.var(axis=0, ddof=1) / len(br))
+        region_noise = np.where(spread > 0, spread / np.abs(reference), 0.0)
     region_p = mean_p(ar, br, tolerance)
     return Comparison(
         ours=a.mean(axis=0),
@@ -223,23 +240,25 @@ def compare(
         region_p=region_p,
         region_threshold=sidak(share, region_p.size),
         region_error=error,
+        region_noise=region_noise,
+        most_noise=most_noise,
         tolerance=tolerance,
     )
 
 
 def write_image(path: Path, pixels: Array) -> None:
     """An EXR (or whatever the ending says) of pixels (h, w, c), top row first."""
-    import OpenImageIO as oiio  # type: ignore[import-not-found]
+    import OpenImageIO
 
     data = np.ascontiguousarray(pixels, np.float32)
-    buffer = oiio.ImageBuf(oiio.ImageSpec(data.shape[1], data.shape[0], data.shape[2], oiio.FLOAT))
-    buffer.set_pixels(oiio.ROI(), data)
+    buffer = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(data.shape[1], data.shape[0], data.shape[2], OpenImageIO.FLOAT))
+    buffer.set_pixels(OpenImageIO.ROI(), data)
     if not buffer.write(str(path)):
         raise OSError(f"'{path}' cannot be written: {buffer.geterror()}")
 
 
 def assert_agree(name: str, comparison: Comparison, again: str, folder: Path = Path("out/failures")) -> None:
-    """Fail with the figures, after writing both images, their difference and the p-values; `again` says seed and command."""
+    """Fail with the figures, after writing images, difference and p-values; `again` says seed and command."""
     print(f"{name}: {comparison.summary()}")
     if not comparison.failures:
         return

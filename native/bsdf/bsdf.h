@@ -67,12 +67,7 @@ VLP_HD inline LobeValue evaluate(const Bsdf& bsdf, const Lobe& lobe, const Direc
     }
 }
 
-// All finite lobes: the sum of their values and their densities, each by the probability of its lobe. The densities
-// are those of a walk along `eye` choosing `light` (pdf_light), and of a walk along `light` choosing `eye` (pdf_eye).
-VLP_HD inline LobeValue evaluate(const Bsdf& bsdf, Vec3 eye, Vec3 light) {
-    const DirectionPair d = make_pair(bsdf, eye, light);
-    if (d.on_surface()) return {};
-    if (bsdf.is_diffuse()) return d.reflects() ? evaluate_diffuse(bsdf.lobes[0].weight, d) : LobeValue{};
+VLP_HD inline LobeValue evaluate_lobes(const Bsdf& bsdf, const DirectionPair& d) {
     LobeValue sum;
     for (uint32_t i = 0; i < bsdf.count; ++i) {
         const Lobe& lobe = bsdf.lobes[i];
@@ -83,6 +78,16 @@ VLP_HD inline LobeValue evaluate(const Bsdf& bsdf, Vec3 eye, Vec3 light) {
         sum.f += lobe.layered_under < 0 ? value.f : value.f * passed_by_layers(bsdf, lobe, std::fabs(d.eye_s));
     }
     return sum;
+}
+
+// All finite lobes: the sum of their values and their densities, each by the probability of its lobe. The densities
+// are those of a walk along `eye` choosing `light` (pdf_light), and of a walk along `light` choosing `eye` (pdf_eye).
+// A single diffuse lobe, the common case, is inlined where this is called.
+VLP_HD VLP_FORCE_INLINE LobeValue evaluate(const Bsdf& bsdf, Vec3 eye, Vec3 light) {
+    const DirectionPair d = make_pair(bsdf, eye, light);
+    if (d.on_surface()) return {};
+    if (bsdf.is_diffuse()) return d.reflects() ? evaluate_diffuse(bsdf.lobes[0].weight, d) : LobeValue{};
+    return evaluate_lobes(bsdf, d);
 }
 
 // f_s(w_light -> w_eye) |w_light.ns| / |w_light.ng|; for refraction f_s is the radiance BSDF (Veach 1997, 5.2).
@@ -149,7 +154,7 @@ VLP_HD inline MicrofacetSample sample_microfacet(const Bsdf& bsdf, const Lobe& l
     MicrofacetSample way{{}, {}, 1, 1};
     bool reflects = true;
     if (lobe.kind == LobeKind::reflection) {
-        way.share = reflectance(lobe, cos_h);
+        way.share = is_specular(lobe) ? reflectance(lobe, cos_h) : rgb(1);
     } else {
         const float eta = from_s < 0 ? 1.0f / lobe.eta : lobe.eta;
         const Split split = split_light(lobe, cos_h, eta);

@@ -39,7 +39,9 @@ VLP_HD inline LobeValue evaluate_dielectric(const Lobe& lobe, const float* table
     const float eye_h = dot(d.eye, h), light_h = dot(d.light, h);
     if (eye_h <= 0 || (light_h > 0) != reflects) return {};  // no microfacet that faces both joins the two
 
-    const Split split = split_light(lobe, eye_h, eta);
+    // Of a refracted pair, seen from the thinner side, where the Fresnel term is not steep: the same from both ends.
+    const bool from_eye = reflects || eta >= 1;
+    const Split split = split_light(lobe, from_eye ? eye_h : -light_h, from_eye ? eta : 1.0f / eta);
     const float alpha2 = square(lobe.alpha), density = ggx_d(alpha2, normal, h);
     const float root_eye = smith_root(alpha2, cos_eye), root_light = smith_root(alpha2, cos_light);
     const float visible_eye = visible_density(density, cos_eye, root_eye);

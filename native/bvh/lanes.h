@@ -77,12 +77,13 @@ VLP_FORCE_INLINE uint32_t intersect_block(const TraversalRay& ray, const Triangl
     if (_mm_movemask_ps(inside) == 0) return 0;
     const __m128 det = _mm_add_ps(_mm_add_ps(u, v), w);
     const __m128 inverse = _mm_div_ps(_mm_set1_ps(1.0f), det);
-    const __m128 sum = _mm_fmadd_ps(u, az, _mm_fmadd_ps(v, bz, _mm_mul_ps(w, cz)));
-    const __m128 t = _mm_mul_ps(_mm_mul_ps(sum, inverse), _mm_set1_ps(r.scale_z));
+    const __m128 wa = _mm_mul_ps(u, inverse), wb = _mm_mul_ps(v, inverse), wc = _mm_mul_ps(w, inverse);
+    const __m128 z = _mm_fmadd_ps(wa, az, _mm_fmadd_ps(wb, bz, _mm_mul_ps(wc, cz)));
+    const __m128 t = _mm_mul_ps(z, _mm_set1_ps(r.scale_z));
     const __m128 in_range = _mm_and_ps(_mm_cmpgt_ps(t, zero), _mm_cmplt_ps(t, _mm_set1_ps(t_max)));
     _mm_store_ps(hits.t, t);
-    _mm_store_ps(hits.u, _mm_mul_ps(v, inverse));
-    _mm_store_ps(hits.v, _mm_mul_ps(w, inverse));
+    _mm_store_ps(hits.u, wb);
+    _mm_store_ps(hits.v, wc);
     const __m128 vanishing = _mm_and_ps(_mm_cmpeq_ps(least, zero), _mm_cmpeq_ps(most, zero));
     auto mask = static_cast<uint32_t>(_mm_movemask_ps(_mm_andnot_ps(vanishing, _mm_and_ps(inside, in_range))));
     for (auto left = static_cast<uint32_t>(_mm_movemask_ps(vanishing)); left != 0; left &= left - 1) {

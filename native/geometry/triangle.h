@@ -53,9 +53,10 @@ template <typename Real>
 VLP_HD inline TriangleHit solve(Real u, Real v, Real w, Real az, Real bz, Real cz, float scale_z, float t_max) {
     const Real det = u + v + w;
     const Real inverse = 1 / det;
-    const float t = static_cast<float>((u * az + v * bz + w * cz) * inverse) * scale_z;
+    const Real wa = u * inverse, wb = v * inverse, wc = w * inverse;  // before z: their products with it could overflow
+    const float t = static_cast<float>(wa * az + wb * bz + wc * cz) * scale_z;
     const bool found = det != 0 && t > 0 && t < t_max;
-    return {t, static_cast<float>(v * inverse), static_cast<float>(w * inverse), found};
+    return {t, static_cast<float>(wb), static_cast<float>(wc), found};
 }
 
 }  // namespace detail

@@ -153,19 +153,15 @@ VLP_HD inline void for_each_lamp_hit(const SceneView& scene, const Ray& ray, F&&
         const Light& light = scene.lights[index];
         float t = 0;
         Vec3 normal = light.normal;
-        if (light.kind == LightKind::area) {
-            if (!area_intersect(light, ray, t)) continue;
-        } else if (light.kind == LightKind::point || light.kind == LightKind::spot) {
-            if (!intersect_sphere_shape(light.position, light.radius, ray, t, normal)) continue;
-        } else {
-            continue;
-        }
-        f(index, t, ray.origin + t * ray.direction, normal);
+        const bool hit = light.kind == LightKind::area
+                             ? area_intersect(light, ray, t)
+                             : intersect_sphere_shape(light.position, light.radius, ray, t, normal);
+        if (hit) f(index, t, ray.origin + t * ray.direction, normal);
     }
 }
 
-// Calls f(light_index) for every infinite light that an escaping ray in `direction` may see: the environment and suns with
-// an angle. What it sees of one is emitted(..., -direction).
+// Calls f(light_index) for every infinite light that an escaping ray in `direction` sees: the environment and the suns in
+// whose disc it ends. What it sees of one is emitted(..., -direction).
 template <typename F>
 VLP_HD inline void for_each_infinite_light(const SceneView& scene, Vec3 direction, F&& f) {
     for (uint32_t i = 0; i < scene.infinite_light_count; ++i) {

@@ -151,9 +151,11 @@ float power(const Light& light, float scene_radius) {
             watts = mean * cone * (light.radius > 0 ? k_pi_d * light.radius * light.radius : 1);
             break;
         }
-        case LightKind::sun:
-            watts = mean * disc * (light.radius > 0 ? k_pi_d * light.radius * light.radius : 1);
+        case LightKind::sun: {
+            const double solid_angle = 2 * k_pi_d * light.radius * light.radius / (1 + light.cos_outer);
+            watts = mean * disc * (light.radius > 0 ? solid_angle : 1);
             break;
+        }
         case LightKind::area:
             watts = mean * k_pi_d * light.area * light.spread_share;
             break;
@@ -166,17 +168,6 @@ float power(const Light& light, float scene_radius) {
             break;
     }
     return static_cast<float>(watts);
-}
-
-std::vector<uint32_t> list_lamps(std::span<const Light> lights) {
-    std::vector<uint32_t> lamps;
-    for (uint32_t i = 0; i < lights.size(); ++i) {
-        const Light& light = lights[i];
-        const bool round =
-            light.kind == LightKind::point || light.kind == LightKind::spot || light.kind == LightKind::sun;
-        if (light.kind == LightKind::area || (round && light.radius > 0)) lamps.push_back(i);
-    }
-    return lamps;
 }
 
 std::vector<uint32_t> make_distribution(std::span<const double> weights) {

@@ -28,9 +28,6 @@ Light make_environment(Rgb radiance);
 // Watts that leave the light, mean of the channels; for infinite lights what enters the scene's sphere.
 float power(const Light& light, float scene_radius);
 
-// The indices for LampView: lamps that rays can meet.
-std::vector<uint32_t> list_lamps(std::span<const Light> lights);
-
 // The array of a Distribution. Each entry gets at least one of the 2^32 numbers, so that none is impossible that may
 // still matter: an entry of weight 0 is drawn once in 2^32. All weights 0: uniform. They must be finite and not negative.
 std::vector<uint32_t> make_distribution(std::span<const double> weights);

@@ -26,7 +26,7 @@ struct Light {
     float spread_share = 1;  // area: of a Lambertian lamp's power, that the spread leaves
 };
 
-// Lamps that rays can meet: shapes (point and spot with a radius, area), which do not block them, and suns with an angle.
+// Lamps with a shape (radius or area), found by rays but not blocking them.
 struct LampView {
     const uint32_t* lights = nullptr;  // indices of such lamps
     uint32_t count = 0;

@@ -52,12 +52,12 @@ VLP_HD inline NextEvent point_sample_next_event(const Light& light, Vec3 receive
     NextEvent e;
     const Vec3 to_light = light.position - receiver;
     const float distance_squared = length_squared(to_light);
-    if (distance_squared == 0) return e;
+    e.radiance = light.radiance / distance_squared;
+    if (!is_finite(e.radiance) || !is_finite(distance_squared)) return e;
     e.position = light.position;
     e.distance = std::sqrt(distance_squared);
     e.direction = to_light / e.distance;
     e.normal = -e.direction;
-    e.radiance = light.radiance / distance_squared;
     e.pdf_solid_angle = 1;
     e.delta = true;
     return e;

@@ -43,7 +43,7 @@ VLP_HD inline NextEvent sample_sphere_shape(Vec3 center, float radius, Vec3 rece
     if (aspect.inside) {
         e.direction = sample_sphere(u);
         e.distance = distance_to_far_side(center, radius, receiver, e.direction);
-        const Vec3 outward = normalize(receiver + e.distance * e.direction - center);
+        const Vec3 outward = normalize((receiver - center) + e.distance * e.direction);
         e.normal = -outward;
         e.position = center + radius * outward;
         return e;

@@ -1,7 +1,111 @@
-"""Types of the native core (see _native.py)."""
+"""Types of the native core (see _native.py). Shapes in comments; arrays must be C-contiguous and of the stated type."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float32 = NDArray[np.float32]
+Int32 = NDArray[np.int32]
+Triple = tuple[float, float, float]
 
 __version__: str
 isa: str
 
 def cpu_supports_avx2() -> bool: ...
-def cuda_device_count() -> int: ...
+def devices() -> list[dict[str, Any]]: ...
+
+class Scene:
+    def __init__(self) -> None: ...
+    def add_mesh(
+        self,
+        positions: Float32,  # (V, 3)
+        triangles: Int32,  # (T, 3)
+        corner_normals: Float32 | None,  # (T, 3, 3)
+        uvs: Float32 | None,  # (T, 3, 2)
+        material_index: Int32 | None,  # (T,)
+    ) -> int: ...
+    def add_spheres(
+        self,
+        centers: Float32,  # (N, 3)
+        radii: Float32,  # (N,)
+        material_index: Int32 | None,  # (N,)
+    ) -> int: ...
+    def add_material(
+        self,
+        kinds: Int32,  # (n,)
+        fresnels: Int32,  # (n,)
+        weights: Float32,  # (n, 3)
+        roughness: Float32,  # (n,)
+        ior: Float32,  # (n,)
+        f0: Float32,  # (n, 3)
+        f82: Float32,  # (n, 3)
+        layered_under: Int32,  # (n,)
+        compensate: Int32,  # (n,)
+        emission: Triple,
+    ) -> int: ...
+    def add_instance(
+        self,
+        geometry: int,
+        transform: Float32,  # (3, 4)
+        materials: Int32,  # (slots,)
+        visibility: int,
+    ) -> None: ...
+    def add_point_light(self, position: Triple, power: Triple, radius: float, visibility: int) -> bool: ...
+    def add_spot_light(
+        self, transform: Float32, power: Triple, spot_size: float, blend: float, radius: float, visibility: int
+    ) -> bool: ...
+    def add_sun_light(self, transform: Float32, irradiance: Triple, angle: float, visibility: int) -> bool: ...
+    def add_area_light(
+        self,
+        transform: Float32,
+        power: Triple,
+        size_x: float,
+        size_y: float,
+        ellipse: bool,
+        spread: float,
+        visibility: int,
+    ) -> bool: ...
+    def set_world(self, radiance: Triple) -> None: ...
+    def set_camera(
+        self,
+        transform: Float32,
+        projection: int,
+        half_width: float,
+        half_height: float,
+        shift_x: float,
+        shift_y: float,
+        clip_start: float,
+        clip_end: float,
+        aperture_radius: float,
+        focus_distance: float,
+    ) -> None: ...
+    def set_film(
+        self, width: int, height: int, x: int, y: int, window_width: int, window_height: int, transparent: bool
+    ) -> None: ...
+    def build(self, threads: int = 0) -> None: ...
+    # origins, directions (n, 3), t_max (n,); gives t, u, v, primitive, instance, each (n,)
+    def intersect(self, origins: Float32, directions: Float32, t_max: Float32) -> dict[str, NDArray[Any]]: ...
+    def occluded(self, origins: Float32, directions: Float32, t_max: Float32) -> NDArray[np.uint8]: ...
+    def info(self) -> dict[str, Any]: ...
+
+class Renderer:
+    def __init__(self, scene: Scene, settings: dict[str, Any]) -> None: ...
+    def iterate(self, count: int) -> int: ...
+    def cancel(self) -> None: ...
+    def set_deadline(self, seconds: float) -> None: ...
+    def progress(self) -> float: ...
+    def read(self, out: Float32) -> None: ...  # (height, width, 4)
+    def film_state(self) -> NDArray[np.int64]: ...  # (height, width, 4, 2): low and high words
+    def add_film_state(self, state: NDArray[np.int64], iterations: int) -> None: ...
+    def memory(self) -> dict[str, int]: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def vlps(self) -> int: ...
+    @property
+    def dropped(self) -> int: ...
+    @property
+    def paths(self) -> int: ...
+    @property
+    def kappa(self) -> float: ...

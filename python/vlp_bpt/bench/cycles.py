@@ -1,9 +1,9 @@
 """Cycles on the CPU as an unbiased renderer to compare with: everything off that trades truth for speed.
 
-The path-length window. `scatterings` is the largest number of surface hits between the lens and the light, both ends left
-out. Cycles' `max_bounces` = B evaluates direct light at B + 1 hits and the emission that one ray beyond them finds, so
-B = scatterings - 1. Here an eye path of at most K hits with light samples alone (C = 0) has scatterings = K; joined to
-light paths of at most L hits, K + L.
+The path-length window. `scatterings` is the largest number of surface hits between the lens and the light, both ends
+left out. Cycles' `max_bounces` = B evaluates direct light at B + 1 hits and the emission that one ray beyond them
+finds, so B = scatterings - 1. Here an eye path of at most K hits with light samples alone (C = 0) has
+scatterings = K; joined to light paths of at most L hits, K + L.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vlp_bpt._blender import _console as quiet
 from vlp_bpt.errors import Error
 
 
@@ -37,7 +38,8 @@ def open_scene(blend: Path) -> Any:
         import addon_utils
 
         addon_utils.enable("cycles")
-    bpy.ops.wm.open_mainfile(filepath=str(Path(blend).resolve()))
+    with quiet():
+        bpy.ops.wm.open_mainfile(filepath=str(Path(blend).resolve()))
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.use_persistent_data = False
@@ -101,20 +103,23 @@ def render(
         path = Path(folder) / "cycles.exr"
         scene.render.filepath = str(path)
         scene.render.use_file_extension = False
-        bpy.ops.render.render(write_still=True, scene=scene.name)
+        with quiet():
+            bpy.ops.render.render(write_still=True, scene=scene.name)
         return CyclesImage(*_read(path), samples)
 
 
 def _read(path: Path) -> tuple[NDArray[np.float32], float]:
     """Pixels and the render time that the engine stamped into an EXR file."""
-    import OpenImageIO as oiio
+    import OpenImageIO
 
-    image = oiio.ImageInput.open(str(path))
+    image = OpenImageIO.ImageInput.open(str(path))
     if image is None:
         raise Error(f"Cycles wrote no image to '{path}'")
     spec = image.spec()
-    pixels = np.ascontiguousarray(image.read_image(0, 0, 0, 4, oiio.FLOAT), np.float32)
-    times = [a.value for a in spec.extra_attribs if a.name.startswith("cycles.") and a.name.endswith(".render_time")]
+    pixels = np.ascontiguousarray(image.read_image(0, 0, 0, 4, OpenImageIO.FLOAT), np.float32)
+    times = [
+        str(a.value) for a in spec.extra_attribs if a.name.startswith("cycles.") and a.name.endswith(".render_time")
+    ]
     image.close()
     if not times:
         raise Error(f"Cycles stamped no render time into '{path}'")

@@ -1,0 +1,160 @@
+"""An evaluated depsgraph to `vlp_bpt.Scene`: every geometry once, however often it is placed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from vlp_bpt.scene import Film, Float32, Instance, Mesh, Scene, Spheres, Visibility
+
+from .camera import export_camera
+from .light import export_light
+from .material import default_material, export_material
+from .mesh import export_mesh
+from .notes import ExportError, Notes
+from .pointcloud import export_pointcloud
+from .world import export_world
+
+# Shown through the mesh that they evaluate to, which the depsgraph lists beside them.
+CONVERTED_TYPES = {"CURVE", "SURFACE", "FONT", "META"}
+MISSING_TYPES = {"CURVES": "hair curves", "VOLUME": "volumes", "GREASEPENCIL": "grease pencil"}
+OTHER_VISIBILITY = ("visible_diffuse", "visible_glossy", "visible_transmission", "visible_shadow")
+
+
+def export_scene(
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    width: int | None = None,
+    height: int | None = None,
+    window: tuple[int, int, int, int] | None = None,
+    notes: Notes | None = None,
+) -> Scene:
+    """Everything that the depsgraph's view layer shows in a render.
+
+    width, height: the full resolution in pixels, the scene's own by default; window: the part of it to render.
+    What had to be left out or simplified is added to `notes`. Raises ExportError where nothing can be rendered.
+    """
+    notes = Notes() if notes is None else notes
+    scene = depsgraph.scene_eval
+    render = scene.render
+    width = render.resolution_x * render.resolution_percentage // 100 if width is None else width
+    height = render.resolution_y * render.resolution_percentage // 100 if height is None else height
+    exported = Scene(
+        camera=export_camera(depsgraph, width, height, notes),
+        film=Film(width, height, window, render.film_transparent),
+        world=export_world(scene.world, notes),
+    )
+    _Objects(exported, notes).add_all(depsgraph)
+    return exported
+
+
+class _Objects:
+    """Adds the objects of a depsgraph to a scene, and remembers what was added for the instances to come."""
+
+    def __init__(self, scene: Scene, notes: Notes) -> None:
+        self.scene = scene
+        self.notes = notes
+        self._geometries: dict[tuple[str, int], int] = {}  # type and pointer of evaluated data; -1: nothing to render
+        self._materials: dict[int, int] = {}  # pointer of an evaluated material (0: none)
+        self._slots: dict[tuple[int, int], tuple[int, ...]] = {}  # pointers of the original object and its data
+
+    def add_all(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Adds every object and instance. None of them is kept: they die as the iteration goes on."""
+        transforms = instance_transforms(depsgraph)
+        singular = is_singular(transforms)
+        for index, instance in enumerate(depsgraph.object_instances):
+            if not instance.show_self:
+                continue
+            shown = instance.object
+            if shown.type == "LIGHT":
+                self._add_light(shown, transforms[index], _visibility(instance))
+            elif shown.type in ("MESH", "POINTCLOUD"):
+                self._add_geometry(instance, shown, transforms[index], bool(singular[index]))
+            elif shown.type in MISSING_TYPES:
+                self.notes.warn(f"Object '{shown.name}': {MISSING_TYPES[shown.type]} are not there yet, left out")
+
+    def _add_light(self, lamp: Any, matrix: Float32, visibility: Visibility) -> None:
+        light = export_light(lamp, matrix, visibility, self.notes)
+        if light is not None:
+            self.scene.lights.append(light)
+
+    def _add_geometry(self, instance: Any, shown: Any, matrix: Float32, singular: bool) -> None:
+        geometry = self._geometry(shown)
+        if geometry < 0:
+            return
+        if singular:
+            scale = tuple(round(float(x), 6) for x in np.linalg.norm(matrix[:, :3], axis=0))
+            self.notes.warn(f"Object '{shown.name}': its scale {scale} flattens it to nothing, left out")
+            return
+        if not all(getattr(shown, name) for name in OTHER_VISIBILITY):
+            self.notes.warn(f"Object '{shown.name}': ray visibility other than to the camera is not there yet")
+        if shown.is_holdout:
+            self.notes.warn(f"Object '{shown.name}': holdouts are not there yet")
+        self.scene.instances.append(
+            Instance(shown.name, geometry, matrix, self._material_slots(shown), _visibility(instance))
+        )
+
+    def _geometry(self, shown: Any) -> int:
+        """The index of an object's geometry in the scene, exported at the first sight of it; -1: it is empty."""
+        key = (shown.type, shown.data.as_pointer())
+        if key not in self._geometries:
+            geometry = _exported(shown)
+            self._geometries[key] = -1 if geometry is None else len(self.scene.geometries)
+            if geometry is not None:
+                self.scene.geometries.append(geometry)
+        return self._geometries[key]
+
+    def _material_slots(self, shown: Any) -> tuple[int, ...]:
+        """A scene material for each slot: linked to the object or to its data, at least one."""
+        key = (shown.original.as_pointer(), shown.data.as_pointer())
+        if key not in self._slots:
+            materials = list(shown.data.materials)
+            for index, slot in enumerate(shown.material_slots):
+                if slot.link == "OBJECT" or index >= len(materials):
+                    materials[index : index + 1] = [slot.material]
+            self._slots[key] = tuple(self._material(material) for material in materials or [None])
+        return self._slots[key]
+
+    def _material(self, material: Any) -> int:
+        key = 0 if material is None else material.as_pointer()
+        if key not in self._materials:
+            self._materials[key] = len(self.scene.materials)
+            exported = default_material() if material is None else export_material(material, self.notes)
+            self.scene.materials.append(exported)
+        return self._materials[key]
+
+
+def _exported(shown: Any) -> Mesh | Spheres | None:
+    if shown.type == "POINTCLOUD":
+        return export_pointcloud(shown.data, shown.name)
+    # Through to_mesh: an object in edit mode keeps its vertices elsewhere. It costs nothing otherwise.
+    mesh = shown.to_mesh()
+    try:
+        return None if mesh is None else export_mesh(mesh, shown.name)
+    finally:
+        shown.to_mesh_clear()
+
+
+def _visibility(instance: Any) -> Visibility:
+    visible = instance.object.visible_camera and (not instance.is_instance or instance.parent.visible_camera)
+    return Visibility.CAMERA if visible else Visibility(0)
+
+
+def instance_transforms(depsgraph: bpy.types.Depsgraph) -> Float32:
+    """(I, 3, 4) object-to-world transforms in the order of `object_instances`: Blender stores their columns."""
+    matrices = np.empty(len(depsgraph.object_instances) * 16, np.float32)
+    depsgraph.object_instances.foreach_get("matrix_world", matrices)
+    return np.ascontiguousarray(matrices.reshape(-1, 4, 4).transpose(0, 2, 1)[:, :3])
+
+
+def is_singular(transforms: Float32) -> Any:
+    """(I,) whether a transform flattens space, judged without regard to its overall scale."""
+    linear = transforms[:, :, :3].astype(np.float64)
+    with np.errstate(invalid="ignore", over="ignore"):
+        volume = np.linalg.norm(linear, axis=1).prod(axis=1)
+        return ~(np.abs(np.linalg.det(linear)) > 1e-7 * volume)
+
+
+__all__ = ["ExportError", "Notes", "export_scene"]

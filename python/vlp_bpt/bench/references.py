@@ -1,0 +1,59 @@
+"""Converged pictures as independent batches, kept on disk: a file for each, so that making them can be interrupted."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FOLDER = Path("out/references")
+
+
+def fingerprint(files: list[Path], settings: dict[str, Any]) -> str:
+    """A short hash of the contents of files and of settings (JSON values)."""
+    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode())
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def batches(
+    name: str, key: str, count: int, make: Callable[[int], NDArray[np.float32]], folder: Path = FOLDER
+) -> NDArray[np.float32]:
+    """(count, h, w, c): for each index, `make(index)` or what an earlier call with the same name and key stored."""
+    folder.mkdir(parents=True, exist_ok=True)
+    result = []
+    for index in range(count):
+        path = folder / f"{name}-{key}-{index}.npy"
+        if not path.exists():
+            partial = path.with_suffix(".partial.npy")
+            np.save(partial, make(index))
+            partial.replace(path)
+        result.append(np.load(path, allow_pickle=False))
+    return np.stack(result)
+
+
+def cycles_batches(
+    blend: Path, *, size: tuple[int, int], count: int, samples: int, scatterings: int, folder: Path = FOLDER
+) -> NDArray[np.float32]:
+    """(count, h, w, 3) linear RGB of Cycles, each batch with its own seed and `samples` a pixel; top row first."""
+    import bpy
+
+    from . import cycles
+
+    settings = {"cycles": bpy.app.version_string, "size": size, "samples": samples, "scatterings": scatterings}
+    opened: list[Any] = []
+
+    def make(index: int) -> NDArray[np.float32]:
+        if not opened:
+            opened.append(cycles.open_scene(blend))
+            cycles.set_size(opened[0], *size)
+        image = cycles.render(opened[0], samples=samples, scatterings=scatterings, seed=index + 1)
+        return np.ascontiguousarray(image.pixels[..., :3])
+
+    return batches(f"{Path(blend).stem}-cycles", fingerprint([Path(blend)], settings), count, make, folder)
