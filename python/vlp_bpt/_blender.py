@@ -63,6 +63,8 @@ def render_blend(
                 if progress is not None:
                     progress(now)
 
+            if any(renderer.interrupted for renderer in result.renderers):
+                raise Cancelled("interrupted in an earlier view layer")
             result.renderers.append(self)
             return super().render(both, cancel)
 
