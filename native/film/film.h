@@ -3,23 +3,32 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
 namespace vlp {
 
 // A sum of floats in 128-bit fixed point with 64 bits after the point: exact for values of 2^-40 and more (smaller ones
-// lose what is below 2^-64), whatever the order, for 2^63 in all.
+// lose what is below 2^-64), whatever the order, up to 2^63 in all, where it stays.
 struct ExactSum {
     uint64_t fraction = 0;  // in units of 2^-64
     int64_t whole = 0;
 
+    // Neither may be negative.
     void add(const ExactSum& other) {
+        constexpr int64_t k_most = std::numeric_limits<int64_t>::max();
         fraction += other.fraction;
-        whole += other.whole + (fraction < other.fraction ? 1 : 0);
+        const int64_t carry = fraction < other.fraction ? 1 : 0;
+        if (whole > k_most - other.whole - carry) {
+            *this = {~uint64_t{0}, k_most};
+        } else {
+            whole += other.whole + carry;
+        }
     }
-    // `value` must be finite, not negative and below 2^62.
+    // `value` must be finite and not negative.
     void add(float value) {
+        if (!(value < 0x1p62f)) value = 0x1p62f;
         const double whole_part = std::floor(static_cast<double>(value));
         add({static_cast<uint64_t>((static_cast<double>(value) - whole_part) * 0x1p64),
              static_cast<int64_t>(whole_part)});

@@ -1,0 +1,139 @@
+// Sums of the film: exact, whatever the order, and merged without a change of a bit.
+#include "film/film.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace vlp::test {
+namespace {
+
+using Wide = unsigned __int128;
+
+// `value` in units of 2^-64, by its bits; what is below is cut off.
+Wide in_fixed_point(float value) {
+    int exponent = 0;
+    const auto mantissa = static_cast<Wide>(std::ldexp(std::frexp(value, &exponent), 24));
+    const int shift = exponent - 24 + 64;
+    return shift >= 0 ? mantissa << shift : shift > -64 ? mantissa >> -shift : Wide{0};
+}
+
+Wide in_fixed_point(const ExactSum& sum) {
+    return (static_cast<Wide>(static_cast<uint64_t>(sum.whole)) << 64) | sum.fraction;
+}
+
+std::vector<float> random_values(uint32_t seed, size_t count) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> mantissa(1, 2);
+    std::uniform_int_distribution<int> exponent(-100, 40);
+    std::vector<float> values;
+    for (size_t i = 0; i < count; ++i) values.push_back(std::ldexp(mantissa(random), exponent(random)));
+    for (const float v : {0.0f, 1.0f, 0x1p-64f, 0x1p-149f, 0x1.fffffep-1f, 0x1.fffffep61f}) values.push_back(v);
+    return values;
+}
+
+TEST(ExactSum, EqualsIntegerArithmeticInEveryOrder) {
+    for (uint32_t seed = 0; seed < 20; ++seed) {
+        std::vector<float> values = random_values(seed, 2000);
+        Wide expected = 0;
+        for (const float v : values) expected += in_fixed_point(v);
+        std::mt19937 random(seed);
+        for (int order = 0; order < 5; ++order) {
+            std::shuffle(values.begin(), values.end(), random);
+            ExactSum sum, parts[3];
+            for (size_t i = 0; i < values.size(); ++i) {
+                sum.add(values[i]);
+                parts[i % 3].add(values[i]);
+            }
+            EXPECT_TRUE(in_fixed_point(sum) == expected);
+            parts[0].add(parts[1]);
+            parts[0].add(parts[2]);
+            EXPECT_TRUE(in_fixed_point(parts[0]) == expected);
+        }
+    }
+}
+
+TEST(ExactSum, KeepsSmallBesideLarge) {
+    ExactSum sum;
+    sum.add(0x1p60f);
+    for (int i = 0; i < 1000; ++i) sum.add(0x1p-64f);
+    EXPECT_EQ(sum.whole, int64_t{1} << 60);
+    EXPECT_EQ(sum.fraction, 1000u);
+}
+
+TEST(ExactSum, StaysAtItsEnd) {
+    ExactSum large, small;
+    for (int i = 0; i < 3; ++i) large.add(0x1.fffffep127f);
+    EXPECT_EQ(large.whole, std::numeric_limits<int64_t>::max());
+    small.add(0.5f);
+    small.add(large);
+    EXPECT_EQ(small.whole, large.whole);
+    EXPECT_EQ(small.fraction, large.fraction);
+}
+
+TEST(ExactSum, ValueIsTheNearestDouble) {
+    ExactSum sum;
+    for (int i = 0; i < 3; ++i) sum.add(0.1f);
+    EXPECT_EQ(sum.value(), 3 * static_cast<double>(0.1f));
+}
+
+void fill(Film& film, uint32_t seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> value(0, 10);
+    for (PixelSample& p : film.frame()) {
+        for (float& x : p.rgba) x = value(random);
+    }
+    film.commit_rows(0, 2);
+    film.commit_rows(2, film.window().height);
+    film.count_iteration();
+}
+
+TEST(Film, MergedRangesEqualOneRender) {
+    const Window window{3, 4, 5, 6};
+    Film whole(window), first(window), second(window);
+    for (uint32_t i = 0; i < 7; ++i) {
+        fill(whole, i);
+        fill(i < 4 ? first : second, i);
+    }
+    second.add(first.sums(), first.iterations());
+    EXPECT_EQ(second.iterations(), 7u);
+    std::vector<float> a(window.pixel_count() * 4), b(a.size());
+    whole.read(a);
+    second.read(b);
+    EXPECT_EQ(a, b);
+    for (size_t i = 0; i < a.size(); ++i) {
+        EXPECT_EQ(whole.sums()[i].whole, second.sums()[i].whole);
+        EXPECT_EQ(whole.sums()[i].fraction, second.sums()[i].fraction);
+    }
+}
+
+TEST(Film, ReadsTheMean) {
+    Film film({0, 0, 2, 3});
+    for (uint32_t i = 0; i < 4; ++i) {
+        for (PixelSample& p : film.frame()) p = {{static_cast<float>(i), 1, 0.5f, 0}};
+        film.commit_rows(0, 3);
+        film.count_iteration();
+    }
+    std::vector<float> rgba(24);
+    film.read(rgba);
+    for (size_t i = 0; i < 24; i += 4) {
+        EXPECT_EQ(rgba[i], 1.5f);
+        EXPECT_EQ(rgba[i + 1], 1);
+        EXPECT_EQ(rgba[i + 2], 0.5f);
+        EXPECT_EQ(rgba[i + 3], 0);
+    }
+}
+
+TEST(Film, RefusesOtherSizes) {
+    Film film({0, 0, 2, 3}), other({0, 0, 3, 3});
+    std::vector<float> rgba(20);
+    EXPECT_THROW(film.read(rgba), std::invalid_argument);
+    EXPECT_THROW(film.add(other.sums(), 1), std::invalid_argument);
+    EXPECT_EQ(film.iterations(), 0u);
+}
+
+}  // namespace
+}  // namespace vlp::test
