@@ -1,11 +1,19 @@
 // The pool's workers: sleep until there is a loop, then take pieces until none is left.
 #include "core/parallel.h"
 
+#include <system_error>
+
 namespace vlp {
 
 ThreadPool::ThreadPool(unsigned threads) {
     if (threads == 0) threads = std::thread::hardware_concurrency();
     for (unsigned i = 1; i < threads; ++i) {
+        if (!start_worker()) break;
+    }
+}
+
+bool ThreadPool::start_worker() {
+    try {
         workers_.emplace_back([this] {
             uint64_t seen = 0;
             std::unique_lock lock(mutex_);
@@ -19,7 +27,10 @@ ThreadPool::ThreadPool(unsigned threads) {
                 if (--busy_ == 0) done_.notify_one();
             }
         });
+    } catch (const std::system_error&) {
+        return false;
     }
+    return true;
 }
 
 ThreadPool::~ThreadPool() {

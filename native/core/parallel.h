@@ -14,7 +14,7 @@ namespace vlp {
 
 class ThreadPool {
 public:
-    // `threads` counts the caller, who works too; 0: one for each processor.
+    // `threads` counts the caller, who works too; 0: one for each processor. Fewer where the system gives no more.
     explicit ThreadPool(unsigned threads = 0);
     ~ThreadPool();
     ThreadPool(const ThreadPool&) = delete;
@@ -27,6 +27,7 @@ public:
     void run(uint32_t count, const std::function<void(uint32_t)>& body);
 
 private:
+    bool start_worker();
     void work();
 
     std::vector<std::thread> workers_;
