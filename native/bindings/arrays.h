@@ -16,9 +16,10 @@ namespace vlp {
 
 namespace nb = nanobind;
 
-template <typename T, size_t Dimensions>
-using Array = nb::ndarray<T, nb::ndim<Dimensions>, nb::c_contig, nb::device::cpu>;
-using FloatMatrix = nb::ndarray<const float, nb::shape<3, 4>, nb::c_contig, nb::device::cpu>;
+// Sizes, -1 for any.
+template <typename T, nb::ssize_t... Sizes>
+using Array = nb::ndarray<T, nb::shape<Sizes...>, nb::c_contig, nb::device::cpu>;
+using FloatMatrix = Array<const float, 3, 4>;
 using Triple = std::array<float, 3>;
 
 // The elements of an array as values of T, which packs several of them; nothing for an array that was not given.

@@ -48,8 +48,12 @@ PassSettings pass_of(const nb::dict& settings, bool transparent_film) {
     pass.seed = get<uint32_t>(settings, "seed");
     pass.filter = filter_of(get<std::string>(settings, "filter"));
     pass.filter_width = get<float>(settings, "filter_width");
+    if (!(pass.filter_width > 0) || !is_finite(pass.filter_width)) {
+        throw std::invalid_argument("setting filter_width: " + std::to_string(pass.filter_width) + " must be above 0");
+    }
     if (pass.light_path_length > k_max_walk || pass.eye_path_length > k_max_walk || pass.eye_path_length == 0) {
-        throw std::invalid_argument("settings light_path_length and eye_path_length must be at most 64");
+        throw std::invalid_argument(
+            "settings light_path_length and eye_path_length must be at most 64, the latter at least 1");
     }
     if (static_cast<uint64_t>(pass.light_paths) * pass.light_path_length >= (1ull << 31)) {
         throw std::invalid_argument("settings light_paths * light_path_length must be below 2^31");
@@ -66,7 +70,18 @@ nb::object film_state(const Renderer& renderer) {
     return nb::cast(nb::ndarray<nb::numpy, int64_t>(words, {window.height, window.width, 4, 2}, owner));
 }
 
+// Arrays of a film begin with its rows and columns.
+template <typename A>
+void require_size_of_film(const Renderer& renderer, const A& array, const char* what) {
+    const Window& window = renderer.film().window();
+    if (array.shape(0) == window.height && array.shape(1) == window.width) return;
+    throw std::invalid_argument(std::string(what) + " of " + std::to_string(array.shape(1)) + " x " +
+                                std::to_string(array.shape(0)) + " pixels, but the film has " +
+                                std::to_string(window.width) + " x " + std::to_string(window.height));
+}
+
 void add_film_state(Renderer& renderer, FilmState state, uint64_t iterations) {
+    require_size_of_film(renderer, state, "film state");
     renderer.film().add({reinterpret_cast<const ExactSum*>(state.data()), state.size() / 2}, iterations);
 }
 
@@ -102,10 +117,11 @@ void bind_renderer(nb::module_& m) {
     nb::class_<Renderer>(m, "Renderer")
         .def("__init__",
              [](Renderer* self, std::shared_ptr<Scene> scene, const nb::dict& settings) {
+                 if (!scene || !scene->built()) throw std::runtime_error("scene: build() has not been called");
                  const PassSettings pass = pass_of(settings, scene->transparent_film());
                  const auto device = get<std::string>(settings, "device");
-                 const auto threads = get<uint32_t>(settings, "threads"), first = get<uint32_t>(settings, "iteration_begin");
-                 if (!scene->built()) throw std::runtime_error("scene: build() has not been called");
+                 const auto threads = get<uint32_t>(settings, "threads"),
+                            first = get<uint32_t>(settings, "iteration_begin");
                  nb::gil_scoped_release release;
                  new (self) Renderer(scene, pass, device, threads, first);
              })
@@ -116,13 +132,14 @@ void bind_renderer(nb::module_& m) {
         .def(
             "read",
             [](const Renderer& r, Picture out) {
+                require_size_of_film(r, out, "picture");
                 const std::span<float> rgba(out.data(), out.size());
                 nb::gil_scoped_release release;
                 r.film().read(rgba);
             },
-            nb::arg("out"))
+            nb::arg("out").noconvert())
         .def("film_state", &film_state)
-        .def("add_film_state", &add_film_state, nb::arg("state"), nb::arg("iterations"))
+        .def("add_film_state", &add_film_state, nb::arg("state").noconvert(), nb::arg("iterations"))
         .def("memory", [](const Renderer& r) { return memory_of(r, r.scene()); })
         .def_prop_ro("iterations", [](const Renderer& r) { return r.film().iterations(); })
         .def_prop_ro("vlps", [](const Renderer& r) { return r.counters().stored_vlps.load(); })

@@ -4,10 +4,12 @@
 #include <nanobind/stl/shared_ptr.h>
 
 #include <stdexcept>
+#include <string>
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bvh/traverse.h"
+#include "camera/camera_build.h"
 #include "light/light_build.h"
 #include "scene/material_build.h"
 #include "scene/scene.h"
@@ -15,11 +17,12 @@
 namespace vlp {
 namespace {
 
-using Floats1 = Array<const float, 1>;
-using Floats2 = Array<const float, 2>;
-using Floats3 = Array<const float, 3>;
-using Ints1 = Array<const int32_t, 1>;
-using Ints2 = Array<const int32_t, 2>;
+using Floats = Array<const float, -1>;
+using Triples = Array<const float, -1, 3>;  // points, directions, colours
+using CornerNormals = Array<const float, -1, 3, 3>;
+using CornerUvs = Array<const float, -1, 3, 2>;
+using Ints = Array<const int32_t, -1>;
+using IntTriples = Array<const int32_t, -1, 3>;
 
 bool add_lamp(Scene& scene, const std::optional<Light>& light, uint32_t visibility) {
     if (light) scene.add_lamp(*light, visibility);
@@ -30,6 +33,27 @@ void require_built(const Scene& scene) {
     if (!scene.built()) throw std::runtime_error("scene: build() has not been called");
 }
 
+void require_length(size_t length, size_t expected, const char* what) {
+    if (length == expected) return;
+    throw std::invalid_argument(std::string(what) + ": has " + std::to_string(length) + " elements, must have " +
+                                std::to_string(expected));
+}
+
+LobeKind lobe_kind_of(int32_t kind) {
+    if (kind >= 0 && kind <= static_cast<int32_t>(LobeKind::transparent)) return static_cast<LobeKind>(kind);
+    throw std::invalid_argument("material: unknown kind of lobe " + std::to_string(kind));
+}
+
+Fresnel fresnel_of(int32_t term) {
+    if (term >= 0 && term <= static_cast<int32_t>(Fresnel::tinted_dielectric)) return static_cast<Fresnel>(term);
+    throw std::invalid_argument("material: unknown Fresnel term " + std::to_string(term));
+}
+
+Projection projection_of(int projection) {
+    if (projection == 0 || projection == 1) return static_cast<Projection>(projection);
+    throw std::invalid_argument("camera: unknown projection " + std::to_string(projection));
+}
+
 template <typename T>
 nb::ndarray<nb::numpy, T, nb::ndim<1>> to_numpy(std::vector<T> values) {
     auto* owned = new std::vector<T>(std::move(values));
@@ -38,8 +62,10 @@ nb::ndarray<nb::numpy, T, nb::ndim<1>> to_numpy(std::vector<T> values) {
 }
 
 // Directions need not be of unit length: t counts in their length.
-nb::dict intersect_rays(const Scene& scene, Floats2 origins, Floats2 directions, Floats1 t_max) {
+nb::dict intersect_rays(const Scene& scene, Triples origins, Triples directions, Floats t_max) {
     require_built(scene);
+    require_length(directions.size(), origins.size(), "directions");
+    require_length(t_max.size(), origins.shape(0), "t_max");
     const auto o = span_of<Vec3>(origins), d = span_of<Vec3>(directions);
     const size_t n = o.size();
     std::vector<float> t(n), u(n), v(n);
@@ -60,9 +86,11 @@ nb::dict intersect_rays(const Scene& scene, Floats2 origins, Floats2 directions,
     return result;
 }
 
-nb::ndarray<nb::numpy, uint8_t, nb::ndim<1>> occluded_rays(const Scene& scene, Floats2 origins, Floats2 directions,
-                                                      Floats1 t_max) {
+nb::ndarray<nb::numpy, uint8_t, nb::ndim<1>> occluded_rays(const Scene& scene, Triples origins, Triples directions,
+                                                           Floats t_max) {
     require_built(scene);
+    require_length(directions.size(), origins.size(), "directions");
+    require_length(t_max.size(), origins.shape(0), "t_max");
     const auto o = span_of<Vec3>(origins), d = span_of<Vec3>(directions);
     std::vector<uint8_t> blocked(o.size());
     {
@@ -98,8 +126,8 @@ void bind_scene(nb::module_& m) {
         .def(nb::init<>())
         .def(
             "add_mesh",
-            [](Scene& s, Floats2 positions, Ints2 triangles, std::optional<Floats3> corner_normals,
-               std::optional<Floats3> uvs, std::optional<Ints1> material_index) {
+            [](Scene& s, Triples positions, IntTriples triangles, std::optional<CornerNormals> corner_normals,
+               std::optional<CornerUvs> uvs, std::optional<Ints> material_index) {
                 return s.add_mesh(span_of<Vec3>(positions), span_of<Triangle>(triangles), span_of<Vec3>(corner_normals),
                                   span_of<Vec2>(uvs), span_of<int32_t>(material_index));
             },
@@ -107,17 +135,22 @@ void bind_scene(nb::module_& m) {
             nb::arg("material_index").none())
         .def(
             "add_spheres",
-            [](Scene& s, Floats2 centers, Floats1 radii, std::optional<Ints1> material_index) {
+            [](Scene& s, Triples centers, Floats radii, std::optional<Ints> material_index) {
                 return s.add_spheres(span_of<Vec3>(centers), span_of<float>(radii), span_of<int32_t>(material_index));
             },
             nb::arg("centers"), nb::arg("radii"), nb::arg("material_index").none())
         .def("add_material",
-             [](Scene& s, Ints1 kinds, Ints1 fresnels, Floats2 weights, Floats1 roughness, Floats1 ior, Floats2 f0,
-                Floats2 f82, Ints1 layered_under, Ints1 compensate, Triple emission) {
-                 std::vector<LobeInput> inputs(kinds.size());
-                 for (size_t i = 0; i < inputs.size(); ++i) {
-                     inputs[i] = {static_cast<LobeKind>(kinds.data()[i]),
-                                  static_cast<Fresnel>(fresnels.data()[i]),
+             [](Scene& s, Ints kinds, Ints fresnels, Triples weights, Floats roughness, Floats ior, Triples f0,
+                Triples f82, Ints layered_under, Ints compensate, Triple emission) {
+                 const size_t count = kinds.size();
+                 for (const size_t n : {fresnels.size(), weights.shape(0), roughness.size(), ior.size(), f0.shape(0),
+                                        f82.shape(0), layered_under.size(), compensate.size()}) {
+                     require_length(n, count, "material: an array of lobes");
+                 }
+                 std::vector<LobeInput> inputs(count);
+                 for (size_t i = 0; i < count; ++i) {
+                     inputs[i] = {lobe_kind_of(kinds.data()[i]),
+                                  fresnel_of(fresnels.data()[i]),
                                   span_of<Rgb>(weights)[i],
                                   roughness.data()[i],
                                   ior.data()[i],
@@ -129,7 +162,7 @@ void bind_scene(nb::module_& m) {
                  return s.add_material(inputs, rgb_of(emission));
              })
         .def("add_instance",
-             [](Scene& s, uint32_t geometry, FloatMatrix transform, Ints1 materials, uint32_t visibility) {
+             [](Scene& s, uint32_t geometry, FloatMatrix transform, Ints materials, uint32_t visibility) {
                  s.add_instance(geometry, affine_of(transform), span_of<int32_t>(materials), visibility);
              })
         .def("add_point_light",
@@ -156,22 +189,24 @@ void bind_scene(nb::module_& m) {
         .def("set_camera",
              [](Scene& s, FloatMatrix transform, int projection, float half_width, float half_height, float shift_x,
                 float shift_y, float clip_start, float clip_end, float aperture_radius, float focus_distance) {
-                 Camera camera;
-                 camera.projection = static_cast<Projection>(projection);
-                 camera.camera_to_world = affine_of(transform);
-                 camera.half_size = {half_width, half_height};
-                 camera.shift = {shift_x, shift_y};
-                 camera.clip_start = clip_start;
-                 camera.clip_end = clip_end;
-                 camera.aperture_radius = aperture_radius;
-                 camera.focus_distance = focus_distance;
-                 s.set_camera(camera);
+                 CameraParameters p;
+                 p.transform = affine_of(transform);
+                 p.projection = projection_of(projection);
+                 p.half_size = {half_width, half_height};
+                 p.shift = {shift_x, shift_y};
+                 p.clip_start = clip_start;
+                 p.clip_end = clip_end;
+                 p.aperture_radius = aperture_radius;
+                 p.focus_distance = focus_distance;
+                 const std::optional<Camera> camera = make_camera(p);
+                 if (!camera)
+                     throw std::invalid_argument("camera: its transform is singular or a number is out of range");
+                 s.set_camera(*camera);
              })
         .def("set_film",
              [](Scene& s, uint32_t width, uint32_t height, uint32_t x, uint32_t y, uint32_t window_width,
-                uint32_t window_height, bool transparent) {
-                 s.set_film(width, height, {x, y, window_width, window_height}, transparent);
-             })
+                uint32_t window_height,
+                bool transparent) { s.set_film(width, height, {x, y, window_width, window_height}, transparent); })
         .def("build", &Scene::build, nb::arg("threads") = 0, nb::call_guard<nb::gil_scoped_release>())
         .def("intersect", &intersect_rays, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))
         .def("occluded", &occluded_rays, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))

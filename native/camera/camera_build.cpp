@@ -18,7 +18,8 @@ std::optional<Camera> make_camera(const CameraParameters& p) {
     if (!(std::fabs(turn) > 1e-4f)) return std::nullopt;
     const Vec3 up = turn < 0 ? -third : third;
     const bool sizes = p.half_size.x > 0 && p.half_size.y > 0 && is_finite(p.half_size.x) && is_finite(p.half_size.y);
-    const bool clips = p.clip_start >= 0 && p.clip_end > p.clip_start && is_finite(p.clip_start);
+    const bool behind = p.clip_start < 0 && p.projection == Projection::perspective;
+    const bool clips = !behind && p.clip_end > p.clip_start && is_finite(p.clip_start);
     const bool lens = p.aperture_radius >= 0 && is_finite(p.aperture_radius) && is_finite(p.focus_distance);
     const bool shift = is_finite(p.shift.x) && is_finite(p.shift.y);
     if (!sizes || !clips || !lens || !shift || p.width == 0 || p.height == 0) return std::nullopt;

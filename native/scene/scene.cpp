@@ -3,11 +3,13 @@
 
 #include <chrono>
 #include <stdexcept>
+#include <string>
 
 #include "bsdf/albedo_tables.h"
 #include "geometry/octahedral.h"
 #include "light/light.h"
 #include "light/light_build.h"
+#include "scene/input_checks.h"
 
 namespace vlp {
 namespace {
@@ -62,9 +64,15 @@ size_t Scene::Geometry::bytes() const {
            bytes_of(slots);
 }
 
+void Scene::require_open() const {
+    if (built_) throw std::logic_error("scene: nothing can be added or built again after build()");
+}
+
 uint32_t Scene::add_mesh(std::span<const Vec3> positions, std::span<const Triangle> triangles,
                          std::span<const Vec3> corner_normals, std::span<const Vec2> uvs,
                          std::span<const int32_t> slots) {
+    require_open();
+    check_mesh(positions, triangles, corner_normals, uvs, slots);
     Geometry g;
     g.positions.assign(positions.begin(), positions.end());
     g.triangles.assign(triangles.begin(), triangles.end());
@@ -81,6 +89,8 @@ uint32_t Scene::add_mesh(std::span<const Vec3> positions, std::span<const Triang
 
 uint32_t Scene::add_spheres(std::span<const Vec3> centers, std::span<const float> radii,
                             std::span<const int32_t> slots) {
+    require_open();
+    check_spheres(centers, radii, slots);
     Geometry g;
     g.kind = GeometryKind::spheres;
     g.spheres.resize(centers.size());
@@ -91,12 +101,21 @@ uint32_t Scene::add_spheres(std::span<const Vec3> centers, std::span<const float
 }
 
 uint32_t Scene::add_material(std::span<const LobeInput> lobes, Rgb emission) {
+    require_open();
     materials_.push_back(build_material(lobes, emission, lobes_));
     return static_cast<uint32_t>(materials_.size() - 1);
 }
 
 void Scene::add_instance(uint32_t geometry, const Affine& object_to_world, std::span<const int32_t> materials,
                          uint32_t visibility) {
+    require_open();
+    check_transform(object_to_world);
+    check_indices(materials, materials_.size(), "instance: material of slot");
+    if (geometry >= geometries_.size() || materials.empty()) {
+        throw std::invalid_argument("instance: geometry " + std::to_string(geometry) + " with " +
+                                    std::to_string(materials.size()) + " materials, but there are " +
+                                    std::to_string(geometries_.size()) + " geometries, and one material is the least");
+    }
     InstanceView instance;
     instance.object_to_world = object_to_world;
     instance.world_to_object = inverse(object_to_world);
@@ -110,12 +129,23 @@ void Scene::add_instance(uint32_t geometry, const Affine& object_to_world, std::
 }
 
 void Scene::add_lamp(Light light, uint32_t visibility) {
+    require_open();
     light.visibility = visibility;
     lights_.push_back(light);
     ++info_.lamps;
 }
 
+void Scene::set_camera(const Camera& camera) {
+    require_open();
+    const uint32_t width = camera_.width, height = camera_.height;
+    camera_ = camera;
+    camera_.width = width;
+    camera_.height = height;
+}
+
 void Scene::set_film(uint32_t width, uint32_t height, Window window, bool transparent) {
+    require_open();
+    check_film(width, height, window);
     camera_.width = width;
     camera_.height = height;
     window_ = window;
@@ -123,6 +153,7 @@ void Scene::set_film(uint32_t width, uint32_t height, Window window, bool transp
 }
 
 void Scene::build(unsigned threads) {
+    require_open();
     const auto start = std::chrono::steady_clock::now();
     ThreadPool pool(threads);
     for (const Geometry& g : geometries_) {

@@ -15,17 +15,20 @@ namespace vlp {
 
 class Scene {
 public:
+    // Those that add something throw std::invalid_argument naming the value at fault, and std::logic_error after `build`.
+
     // Index of the new geometry. `corner_normals` (3 a triangle), `uvs` (3 a triangle) and `slots` may be empty.
     uint32_t add_mesh(std::span<const Vec3> positions, std::span<const Triangle> triangles,
                       std::span<const Vec3> corner_normals, std::span<const Vec2> uvs, std::span<const int32_t> slots);
     uint32_t add_spheres(std::span<const Vec3> centers, std::span<const float> radii, std::span<const int32_t> slots);
-    // Index of the new material. Throws std::invalid_argument naming the lobe and the value at fault.
+    // Index of the new material.
     uint32_t add_material(std::span<const LobeInput> lobes, Rgb emission);
+    // The geometry and the materials must have been added before.
     void add_instance(uint32_t geometry, const Affine& object_to_world, std::span<const int32_t> materials,
                       uint32_t visibility);
     void add_lamp(Light light, uint32_t visibility);
     void set_world(Rgb radiance) { world_ = radiance; }
-    void set_camera(const Camera& camera) { camera_ = camera; }
+    void set_camera(const Camera& camera);  // all but the resolution, which set_film sets
     void set_film(uint32_t width, uint32_t height, Window window, bool transparent);
 
     // Builds the tree and the table of lights. Afterwards nothing may be added.
@@ -60,6 +63,7 @@ private:
         size_t bytes() const;
     };
 
+    void require_open() const;
     void bound();
     void collect_emitters();
     void make_light_tables();
