@@ -84,6 +84,16 @@ inline std::vector<Vec3> round_normals(const Mesh& mesh) {
     return normals;
 }
 
+// Normals that lean to one side all over the mesh.
+inline std::vector<Vec3> tilted_normals(const Mesh& mesh, Vec3 aside) {
+    std::vector<Vec3> normals;
+    for (const Triangle& t : mesh.triangles) {
+        const Vec3 a = mesh.positions[t.v[0]], b = mesh.positions[t.v[1]], c = mesh.positions[t.v[2]];
+        normals.insert(normals.end(), 3, normalize(normalize(cross(b - a, c - a)) + aside));
+    }
+    return normals;
+}
+
 // Normals that lean up to `lean` radians away from the surface's own, another way at each corner.
 inline std::vector<Vec3> leaning_normals(const Mesh& mesh, float lean) {
     std::vector<Vec3> normals;
@@ -103,6 +113,14 @@ inline Affine placed_at(Vec3 position, Vec3 scale = {1, 1, 1}) {
     Affine a;
     a.m[0][0] = scale.x, a.m[1][1] = scale.y, a.m[2][2] = scale.z;
     a.m[0][3] = position.x, a.m[1][3] = position.y, a.m[2][3] = position.z;
+    return a;
+}
+
+// Tilted about x, so that its -z looks down and aside.
+inline Affine aslant(Vec3 position) {
+    Affine a = placed_at(position);
+    const float c = std::cos(0.4f), s = std::sin(0.4f);
+    a.m[1][1] = c, a.m[1][2] = -s, a.m[2][1] = s, a.m[2][2] = c;
     return a;
 }
 
@@ -132,18 +150,16 @@ inline std::vector<NamedLight> every_light() {
     const auto lamp = [](std::optional<Light> light) {
         return [light](Scene& scene) { scene.add_lamp(light.value(), 0); };
     };
-    Affine aslant = placed_at(above);  // tilted about x, so that its -z looks down and aside
-    const float c = std::cos(0.4f), s = std::sin(0.4f);
-    aslant.m[1][1] = c, aslant.m[1][2] = -s, aslant.m[2][1] = s, aslant.m[2][2] = c;
+    const Affine tilted = aslant(above);
     const Affine above_transform = placed_at(above), oval = placed_at(above, {1, 0.4f, 1});
     std::vector<NamedLight> lights = {
         {"point", lamp(make_point(above, power, 0))},
         {"point_sphere", lamp(make_point(above, power, 0.2f))},
-        {"spot", lamp(make_spot(aslant, power, 1.6f, 0.5f, 0))},
-        {"spot_sphere", lamp(make_spot(aslant, power, 1.6f, 0.5f, 0.15f))},
-        {"sun", lamp(make_sun(aslant, power * 0.1f, 0))},
-        {"sun_disc", lamp(make_sun(aslant, power * 0.1f, 0.3f))},
-        {"rectangle", lamp(make_area(aslant, power, 0.6f, 0.4f, false, k_pi))},
+        {"spot", lamp(make_spot(tilted, power, 1.6f, 0.5f, 0))},
+        {"spot_sphere", lamp(make_spot(tilted, power, 1.6f, 0.5f, 0.15f))},
+        {"sun", lamp(make_sun(tilted, power * 0.1f, 0))},
+        {"sun_disc", lamp(make_sun(tilted, power * 0.1f, 0.3f))},
+        {"rectangle", lamp(make_area(tilted, power, 0.6f, 0.4f, false, k_pi))},
         {"ellipse", lamp(make_area(oval, power, 0.9f, 0.9f, true, k_pi))},
         {"spread", lamp(make_area(above_transform, power, 0.5f, 0.5f, false, 1.2f))},
         {"mesh",
@@ -178,6 +194,9 @@ inline std::unique_ptr<Scene> crowded_room(const std::function<void(Scene&)>& ad
     add_surface(*scene, ball, k_layered, placed_at({0.7f, -0.1f, 0.2f}, {0.2f, 0.2f, 0.2f}),
                 leaning_normals(ball, 0.5f));
     add_sphere(*scene, {0.1f, -0.4f, 0.25f}, 0.25f, k_glass);
+    // One interface alone: what a closed body does to solid angles on the way in, it undoes on the way out.
+    add_surface(*scene, quad({-0.8f, -0.9f, 1.2f}, {0, -0.9f, 1.2f}, {0, 0.4f, 1.3f}, {-0.8f, 0.4f, 1.3f}),
+                k_glass);
     add_lights(*scene);
     scene->set_camera(looking({0, -3.2f, 1.1f}, {0, 0, 0.8f}, 0.45f));
     scene->set_film(pixels, pixels, {0, 0, pixels, pixels}, false);
