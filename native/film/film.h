@@ -49,8 +49,7 @@ struct Window {
 
 class Film {
 public:
-    explicit Film(Window window)
-        : window_(window), frame_(window.pixel_count()), sums_(window.pixel_count() * 4) {}
+    explicit Film(Window window) : window_(window), frame_(window.pixel_count()), sums_(window.pixel_count() * 4) {}
 
     const Window& window() const { return window_; }
     // The iteration under way, row by row from the bottom; counts only once it is committed.

@@ -195,8 +195,7 @@ inline std::unique_ptr<Scene> crowded_room(const std::function<void(Scene&)>& ad
                 leaning_normals(ball, 0.5f));
     add_sphere(*scene, {0.1f, -0.4f, 0.25f}, 0.25f, k_glass);
     // One interface alone: what a closed body does to solid angles on the way in, it undoes on the way out.
-    add_surface(*scene, quad({-0.8f, -0.9f, 1.2f}, {0, -0.9f, 1.2f}, {0, 0.4f, 1.3f}, {-0.8f, 0.4f, 1.3f}),
-                k_glass);
+    add_surface(*scene, quad({-0.8f, -0.9f, 1.2f}, {0, -0.9f, 1.2f}, {0, 0.4f, 1.3f}, {-0.8f, 0.4f, 1.3f}), k_glass);
     add_lights(*scene);
     scene->set_camera(looking({0, -3.2f, 1.1f}, {0, 0, 0.8f}, 0.45f));
     scene->set_film(pixels, pixels, {0, 0, pixels, pixels}, false);

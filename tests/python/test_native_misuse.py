@@ -142,8 +142,8 @@ def native_renderer(**changes: Any) -> Any:
     [
         {"light_path_length": 65}, {"eye_path_length": 65}, {"eye_path_length": 0}, {"light_paths": -1},
         {"light_paths": 2**40}, {"light_paths": 2**31, "light_path_length": 2}, {"weighting": "MEDIAN"},
-        {"weighting": 3}, {"filter": "SHARP"}, {"filter_width": NAN}, {"filter_width": -1.0}, {"device": "ABACUS"}, {"seed": "x"},
-        {"threads": -1}, {"mode": None},
+        {"weighting": 3}, {"filter": "SHARP"}, {"filter_width": NAN}, {"filter_width": -1.0}, {"device": "ABACUS"},
+        {"seed": "x"}, {"threads": -1}, {"mode": None},
     ],
 )  # fmt: skip
 def test_native_settings_raise(changes: dict[str, Any]) -> None:
