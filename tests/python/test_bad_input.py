@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from scenes_for_tests import Builder, ball, grey, looking, render, settings, sphere, square, transform
 
 from vlp_bpt import Error, Renderer, RenderSettings, Scene, SceneError, SettingsError
+from vlp_bpt.images import read_image
 from vlp_bpt.scene import (
     AreaLight,
     Camera,
@@ -28,6 +30,7 @@ from vlp_bpt.scene import (
     SunLight,
     World,
 )
+from vlp_bpt.snapshot import Snapshot, load_snapshot, save_snapshot
 
 NAN, INF = math.nan, math.inf
 
@@ -321,3 +324,46 @@ def test_fresnel_of_every_kind_renders() -> None:
             scene = plain()
             scene.materials[0] = Material("odd", (Lobe(kind, (0.9,) * 3, 0.3, 1.3, term, (0.5,) * 3, (0.4,) * 3),))
             assert np.isfinite(render(scene, settings(samples=1))).all()
+
+
+# Files
+
+
+@pytest.mark.parametrize("read", [load_snapshot, read_image])
+def test_absent_and_foreign_files_are_named(read: Callable[[Path], Any], tmp_path: Path) -> None:
+    contents = {
+        "empty": b"",
+        "text": b"no picture",
+        "zip": b"PK\3\4" + b"\0" * 99,
+        "exr": b"\x76\x2f\x31\1" + b"\xff" * 99,
+    }
+    files = [tmp_path / "absent.exr", tmp_path]
+    for name, content in contents.items():
+        files.append(tmp_path / f"{name}.exr")
+        files[-1].write_bytes(content)
+    for file in files:
+        with pytest.raises(Error, match=file.name):
+            read(file)
+
+
+def test_damaged_snapshots_are_named(tmp_path: Path) -> None:
+    """Cut short or with bytes turned over: an error that names the file, or a scene that passes validation or not."""
+    whole, damaged = tmp_path / "scene.vlp.npz", tmp_path / "damaged.vlp.npz"
+    save_snapshot(whole, Snapshot(plain(), settings()))
+    content = whole.read_bytes()
+    rng = np.random.default_rng(1)
+    refused = 0
+    for trial in range(120):
+        if trial % 2 == 0:
+            broken = content[: rng.integers(len(content))]
+        else:
+            bytes_ = np.frombuffer(content, np.uint8).copy()
+            bytes_[rng.integers(len(bytes_), size=3)] ^= np.uint8(rng.integers(1, 256))
+            broken = bytes_.tobytes()
+        damaged.write_bytes(broken)
+        try:
+            load_snapshot(damaged).scene.validate()
+        except Error as error:
+            refused += 1
+            assert "'" in str(error)  # the file, or the datablock whose numbers were damaged
+    assert refused > 60
