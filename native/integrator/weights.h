@@ -61,11 +61,11 @@ VLP_HD inline void add_shorter_light_walks(StrategySum& sum, const PassSettings&
                                            uint32_t n, float ratio, float next_ratio) {
     const LightVertex* freed = vlp;  // x_k = y_k, free of the light walk from strategy k on
     for (uint32_t k = s - 1; n - k <= pass.eye_path_length + 1 && ratio > 0; --k, --freed) {
-        const bool finite = freed == vlp || !freed->specular();
-        if (k == 0) {
+        if (k == 0) {  // y_0 has no slot: `freed` must not be looked at
             sum.add(ratio, strategy_count(pass, 0));
             return;
         }
+        const bool finite = freed == vlp || !freed->specular();
         if (k == 1) {
             if (finite) sum.add(ratio * freed->next_event_ratio, strategy_count(pass, 1));
         } else if (finite && !freed[-1].specular()) {
