@@ -28,6 +28,8 @@ struct StrategyScene {
     std::string name;
     std::function<void(Scene&)> fill;
     std::function<bool(uint32_t n, uint32_t s)> possible;  // by the delta distributions in all paths of n vertices
+
+    friend void PrintTo(const StrategyScene& scene, std::ostream* out) { *out << scene.name; }
 };
 
 bool all_possible(uint32_t, uint32_t) { return true; }
@@ -94,7 +96,7 @@ std::vector<StrategyScene> strategy_scenes() {
         {"veil",
          [=](Scene& scene) {
              add_plates(scene);
-             add_surface(scene, quad({-1, -1, 1.4f}, {0.8f, -1, 1.4f}, {0.8f, 0.8f, 1.4f}, {-1, 0.8f, 1.4f}), k_veil);
+             add_surface(scene, quad({-1.2f, -1, 0.2f}, {1, 0.9f, 0.2f}, {1, 0.9f, 1.9f}, {-1.2f, -1, 1.9f}), k_veil);
              scene.add_lamp(make_area(large, power, 1, 1, false, k_pi).value(), 0);
          },
          all_possible},

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -141,6 +142,8 @@ inline Camera looking(Vec3 eye, Vec3 target, float half_size) {
 struct NamedLight {
     std::string name;
     std::function<void(Scene&)> add;
+
+    friend void PrintTo(const NamedLight& light, std::ostream* out) { *out << light.name; }  // of GoogleTest
 };
 
 // Each for a room of 2 x 2 x 2 metres on the origin, open above.
