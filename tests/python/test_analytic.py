@@ -237,11 +237,15 @@ def test_point_light_over_the_ground(radius: float) -> None:
     assert_mean(pictures, pixel_means(under_point(0.7, 10, 0.3, -0.2)), f"radius {radius}", rounding=2e-3)
 
 
-def test_sphere_emitter_over_the_ground() -> None:
+@pytest.mark.parametrize("scale", [1.0, 3.0, -0.5])
+def test_sphere_emitter_over_the_ground(scale: float) -> None:
+    """An instance that scales a sphere alike in all directions makes a larger or smaller one, mirrored or not."""
     scene = ground([])
     builder = Builder(16, scene.camera)
     builder.scene = scene
-    builder.add(sphere((0.3, -0.2, 0.7), 0.3), Material("light", (), (2, 2, 2)))
+    position, matrix = (0.3, -0.2, 0.7), transform((0, 0, 0), (scale, scale, scale))
+    center = (position[0] / scale, position[1] / scale, position[2] / scale)
+    builder.add(sphere(center, 0.3 / abs(scale)), Material("light", (), (2, 2, 2)), matrix)
     scene.instances[-1].visibility = Visibility(0)
     power = 4 * pi**2 * 0.3**2 * 2
     pictures = batches(scene, settings(samples=256, **DIRECT), 10)[..., :1]
