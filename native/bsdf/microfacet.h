@@ -10,16 +10,24 @@ VLP_HD inline Vec2 unit_circle(float u) {
     const float turns = 4.0f * u;
     const int quadrant = static_cast<int>(turns + 0.5f);
     const float x = (turns - static_cast<float>(quadrant)) * (0.5f * k_pi), x2 = x * x;
-    const float s = x * (1.0f + x2 * (-0.16666667f + x2 * (8.3333333e-3f + x2 * (-1.9841270e-4f + x2 * 2.7557319e-6f))));
+    const float s =
+        x * (1.0f + x2 * (-0.16666667f + x2 * (8.3333333e-3f + x2 * (-1.9841270e-4f + x2 * 2.7557319e-6f))));
     const float c =
         1.0f + x2 * (-0.5f + x2 * (4.1666667e-2f + x2 * (-1.3888889e-3f + x2 * (2.4801587e-5f - x2 * 2.7557319e-7f))));
     switch (quadrant & 3) {
-        case 0: return {c, s};
-        case 1: return {-s, c};
-        case 2: return {-c, -s};
-        default: return {s, -c};
+        case 0:
+            return {c, s};
+        case 1:
+            return {-s, c};
+        case 2:
+            return {-c, -s};
+        default:
+            return {s, -c};
     }
 }
+
+// Half vectors shorter than this, squared, have no direction: both rays graze the surface from opposite ways.
+inline constexpr float k_min_half_squared = 1e-12f;
 
 // D of the unit microfacet normal `h` around the unit `normal`, per solid angle of h. The sine comes from a difference
 // of vectors: 1 - cos^2 has no digits left in narrow lobes.
