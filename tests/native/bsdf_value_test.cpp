@@ -267,6 +267,16 @@ TEST(BsdfValue, SmoothInterfacesObeySnellAndFresnel) {
     EXPECT_EQ(total.pdf_rev_solid_angle, 1);
 }
 
+TEST(BsdfValue, UnitCircleIsCosineAndSine) {
+    for (int i = 0; i < 1000; ++i) {
+        const float u = static_cast<float>(i) / 1000;
+        const Vec2 p = unit_circle(u);
+        const double angle = 2 * 3.14159265358979323846 * static_cast<double>(u);
+        EXPECT_NEAR(p.x, std::cos(angle), 3e-7);
+        EXPECT_NEAR(p.y, std::sin(angle), 3e-7);
+    }
+}
+
 // Schlick's term meets its three anchors; the conductor's meets published reflectances of gold and the dielectric's.
 TEST(BsdfValue, FresnelTermsMeetTheirAnchors) {
     const Rgb f0{0.9f, 0.6f, 0.3f}, tint{0.7f, 1.0f, 0.4f};
