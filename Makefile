@@ -106,11 +106,6 @@ lint-native: .venv/.lint
 	find native -name '*.cpp' -not -path '*/bench/*' | sort | \
 	  xargs -P $(JOBS) -n 1 $(BIN)/clang-tidy -p build/tidy --quiet --extra-arg=-Wno-unknown-warning-option
 
-.PHONY: stubs
-stubs: build .venv/.lint ## write python/vlp_bpt/_native.pyi from the compiled module
-	$(PY) -m nanobind.stubgen -m vlp_bpt._native_baseline -o python/vlp_bpt/_native.pyi
-	$(BIN)/ruff format python/vlp_bpt/_native.pyi
-
 # Wheels carry GPU code made with the PyPI toolchain, whatever CUDA the machine has; WHEEL_CUDA=OFF leaves it out.
 .PHONY: wheel
 wheel: .venv/.wheel .venv311/.ready .ci/wheel.sh ## dist/*.whl: the package for Python 3.11 and every later one

@@ -89,7 +89,6 @@ class Picture:
         width, height = engine.resolution_x, engine.resolution_y
         self._result = engine.begin_result(0, 0, width, height, layer=self._name)
         if self._result is None or not self._result.layers:
-            self._result = None
             raise RuntimeError(f"Blender has no result for view layer '{self._name}'")
         self._size = (self._result.resolution_x, self._result.resolution_y)
         self.window = window(depsgraph.scene.render, (width, height), self._size)
@@ -126,10 +125,11 @@ class Picture:
         self._filled = True
 
     def end(self, cancelled: bool) -> None:
-        """Hands the result back to Blender; what was rendered before a cancel is kept."""
-        if self._result is not None:
-            self._engine.end_result(self._result, cancel=cancelled, do_merge_results=self._filled)
-            self._result = None
+        """Hands the result back to Blender with what was rendered before a cancel.
+
+        Always merged: a picture that was never filled makes Blender crash when it is written to an EXR file.
+        """
+        self._engine.end_result(self._result, cancel=cancelled, do_merge_results=True)
 
 
 def window(settings: Any, full: tuple[int, int], size: tuple[int, int]) -> tuple[int, int, int, int] | None:

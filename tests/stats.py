@@ -148,6 +148,8 @@ class Comparison:
     region_p: Array
     region_threshold: float
     region_error: Array
+    region_noise: Array
+    most_noise: float
     tolerance: float
 
     @property
@@ -164,6 +166,11 @@ class Comparison:
             result.append(
                 f"{self.heavy.mean():.1%} of the blocks are heavy-tailed, more than {self.most_heavy:.1%}: too noisy"
             )
+        if self.region_noise.max() > self.most_noise:
+            result.append(
+                f"the regions' relative standard error reaches {self.region_noise.max():.2%}, more than "
+                f"{self.most_noise:.2%}: too noisy"
+            )
         if (bad := self.region_p < self.region_threshold).any():
             worst = np.unravel_index(int(self.region_p.argmin()), self.region_p.shape)
             result.append(
@@ -176,7 +183,8 @@ class Comparison:
         """One line of figures."""
         return (
             f"mean {self.ours.mean() / self.theirs.mean() - 1:+.3%}, "
-            f"regions within {np.abs(self.region_error).max():.3%}, "
+            f"regions within {np.abs(self.region_error).max():.3%} "
+            f"(standard error up to {self.region_noise.max():.3%}), "
             f"smallest p: blocks {self.block_p.min():.2g} (threshold {self.block_threshold:.2g}), "
             f"regions {self.region_p.min():.2g} ({self.region_threshold:.2g}), "
             f"heavy-tailed blocks {self.heavy.mean():.2%}"
@@ -193,10 +201,13 @@ def compare(
     regions: int = 4,
     blocks_equal: bool = True,
     most_heavy: float = 0.02,
+    most_noise: float = np.inf,
 ) -> Comparison:
     """Compare batches `ours` (n, h, w, c) with `theirs` (m, h, w, c), n and m at least 4.
 
     `tolerance` is relative and for the regions alone; with `blocks_equal` the blocks are tested too, without tolerance.
+    `most_heavy` is the largest share of heavy-tailed blocks, `most_noise` the largest relative standard error of a
+    region's difference, with which the images can be judged.
     """
     if min(len(ours), len(theirs)) < 4 or ours.shape[1:] != theirs.shape[1:]:
         raise ValueError(f"batches of shapes {ours.shape} and {theirs.shape} cannot be compared")
@@ -216,6 +227,8 @@ def compare(
     reference = br.mean(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         error = np.where(reference != 0, ar.mean(axis=0) / reference - 1, 0.0)
+        spread = np.sqrt(ar.var(axis=0, ddof=1) / len(ar) + br.var(axis=0, ddof=1) / len(br))
+        region_noise = np.where(spread > 0, spread / np.abs(reference), 0.0)
     region_p = mean_p(ar, br, tolerance)
     return Comparison(
         ours=a.mean(axis=0),
@@ -227,6 +240,8 @@ def compare(
         region_p=region_p,
         region_threshold=sidak(share, region_p.size),
         region_error=error,
+        region_noise=region_noise,
+        most_noise=most_noise,
         tolerance=tolerance,
     )
 

@@ -138,7 +138,7 @@ def _combine(graph: Graph, place: Place) -> Value | None:
 
 
 def _image(graph: Graph, place: Place) -> Value | None:
-    """The mean of an image: what stands in for a texture that is not looked up. Byte images hold encoded values."""
+    """The mean of an image: what stands in for a texture that is not looked up."""
     image = place.node.image
     if image is None:
         graph.notes.warn(f"{graph.owner}: {place.node.bl_label} '{place.node.name}' has no image")
@@ -147,15 +147,15 @@ def _image(graph: Graph, place: Place) -> Value | None:
         graph.notes.warn(f"{graph.owner}: image '{image.name}' cannot be read from '{image.filepath}'")
         return (1.0, 0.0, 1.0)  # Blender's sign for a missing image
     graph.notes.warn(f"{graph.owner}: image '{image.name}' is not there yet, its mean colour stands in for it")
-    pixels = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(pixels)
-    mean = pixels.reshape(-1, image.channels).mean(axis=0, dtype=np.float64)
+    buffer = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(buffer)
+    pixels = buffer.reshape(-1, image.channels)
     if place.socket.identifier == "Alpha":
-        return float(mean[3]) if image.channels == 4 else 1.0
-    color = mean[:3] if image.channels >= 3 else np.repeat(mean[:1], 3)
-    if not image.is_float and image.colorspace_settings.name == "sRGB":
-        color = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
-    return _triple(float(x) for x in color)
+        return float(pixels[:, 3].mean(dtype=np.float64)) if image.channels == 4 else 1.0
+    colors = pixels[:, :3] if image.channels >= 3 else np.repeat(pixels[:, :1], 3, axis=1)
+    if not image.is_float and image.colorspace_settings.name == "sRGB":  # byte images hold encoded values
+        colors = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+    return _triple(float(mean) for mean in colors.mean(axis=0, dtype=np.float64))
 
 
 FOLDABLE: dict[str, Callable[[Graph, Place], Value | None]] = {

@@ -1,30 +1,9 @@
 // The GGX distribution of microfacet normals with Smith's height-correlated shadowing (Walter et al. 2007, Heitz 2014).
 #pragma once
 
-#include "core/vec.h"
+#include "core/warp.h"
 
 namespace vlp {
-
-// (cos(2 pi u), sin(2 pi u)) for u in [0, 1), to 1e-7, by polynomials on an eighth of the circle.
-VLP_HD inline Vec2 unit_circle(float u) {
-    const float turns = 4.0f * u;
-    const int quadrant = static_cast<int>(turns + 0.5f);
-    const float x = (turns - static_cast<float>(quadrant)) * (0.5f * k_pi), x2 = x * x;
-    const float s =
-        x * (1.0f + x2 * (-0.16666667f + x2 * (8.3333333e-3f + x2 * (-1.9841270e-4f + x2 * 2.7557319e-6f))));
-    const float c =
-        1.0f + x2 * (-0.5f + x2 * (4.1666667e-2f + x2 * (-1.3888889e-3f + x2 * (2.4801587e-5f - x2 * 2.7557319e-7f))));
-    switch (quadrant & 3) {
-        case 0:
-            return {c, s};
-        case 1:
-            return {-s, c};
-        case 2:
-            return {-c, -s};
-        default:
-            return {s, -c};
-    }
-}
 
 // Half vectors shorter than this, squared, have no direction: both rays graze the surface from opposite ways.
 inline constexpr float k_min_half_squared = 1e-12f;

@@ -1,11 +1,11 @@
 // Pixel filters, sampled in proportion to themselves so that every camera sample has weight 1.
 //
 // `width` is Blender's filter width and the shapes are Cycles': a box of that side; a Gaussian of standard deviation
-// width / 4; a Blackman-Harris window that ends at `width` from the pixel's centre. Box widths other than 1 px are our own:
-// Cycles always takes 1.
+// width / 4; a Blackman-Harris window that ends at `width` from the pixel's centre. Box widths other than 1 px are our
+// own: Cycles always takes 1.
 #pragma once
 
-#include "core/vec.h"
+#include "core/warp.h"
 
 namespace vlp {
 
@@ -32,23 +32,23 @@ struct WindowValue {
 
 VLP_HD inline WindowValue blackman_harris(float x) {
     constexpr float k_1 = 0.48829f / 0.35875f, k_2 = 0.14128f / 0.35875f, k_3 = 0.01168f / 0.35875f;
-    const float c = std::cos(k_two_pi * x), s = std::sin(k_two_pi * x);
+    const Vec2 circle = unit_circle(x);
+    const float c = circle.x, s = circle.y;
     const float c2 = 2 * c * c - 1, s2 = 2 * s * c, c3 = c * c2 - s * s2, s3 = s * c2 + c * s2;
     return {max_of(0.0f, 1 - k_1 * c + k_2 * c2 - k_3 * c3),
             x - (k_1 * s - 0.5f * k_2 * s2 + k_3 / 3 * s3) * (0.5f * k_inv_pi)};
 }
 
-// The x whose cumulative is u: a polynomial in the fourth root of u that is good to 4e-4 in u, then one step of Newton's
-// method, which leaves 5e-7.
+// The x whose cumulative is u: a polynomial in the fourth root of u that is good to 4e-4 in u, then one step of
+// Newton's method, which leaves 5e-7.
 VLP_HD inline float blackman_harris_inverse(float u) {
-    const bool upper = u > 0.5f;
-    const float p = upper ? 1 - u : u;
+    const float p = 0.5f - std::fabs(u - 0.5f);  // the window is symmetric
     const float v = std::sqrt(std::sqrt(p));
     const float slope = 0.62942219f + v * (-0.3744739f + v * (1.27710818f + v * (-1.71217459f + v * 1.28380055f)));
     const float start = 0.5f - (0.84089642f - v) * slope;
     const WindowValue at = blackman_harris(start);
     const float x = clamp(start - (at.cumulative - p) / max_of(at.density, 1e-4f), 0.0f, 0.5f);
-    return upper ? 1 - x : x;
+    return 0.5f + std::copysign(0.5f - x, u - 0.5f);
 }
 
 // Offset from the pixel's centre (pixels).
@@ -56,10 +56,8 @@ VLP_HD inline Vec2 sample(Filter filter, float width, Vec2 u) {
     switch (filter) {
         case Filter::box:
             return {width * (u.x - 0.5f), width * (u.y - 0.5f)};
-        case Filter::gaussian: {  // Box & Muller 1958; u has 24 bits, so that no sample lies beyond 5.8 deviations
-            const float r = 0.25f * width * std::sqrt(-2 * std::log(1 - u.x)), angle = k_two_pi * u.y;
-            return {r * std::cos(angle), r * std::sin(angle)};
-        }
+        case Filter::gaussian:  // Box & Muller 1958; u has 24 bits, so that no sample lies beyond 5.8 deviations
+            return 0.25f * width * std::sqrt(-2 * std::log(1 - u.x)) * unit_circle(u.y);
         case Filter::blackman_harris:
             return {2 * width * (blackman_harris_inverse(u.x) - 0.5f),
                     2 * width * (blackman_harris_inverse(u.y) - 0.5f)};

@@ -1,6 +1,7 @@
 // Densities of a path's end on a light, in the measure that both walks and next event are compared in.
 #pragma once
 
+#include "geometry/surface.h"
 #include "light/light.h"
 #include "light/light_choice.h"
 
@@ -14,13 +15,22 @@ struct LightEnd {
     float pdf_next = 0;        // of the light walk going on to x_1, per area of x_1 but for its cosine there
 };
 
-// `distance_squared` and `normal` (at y_0) are not looked at when the light is infinite.
-VLP_HD inline LightEnd light_end(const SceneView& scene, uint32_t light_index, Vec3 x_1, Vec3 y_0, Vec3 normal,
-                                 Vec3 direction, float dist_squared) {
+// Whether x_1 lies on the light. Next event leaves such points to hits: a sphere sees itself from within alone, and rounding
+// would decide whether a point of it is within.
+VLP_HD inline bool is_on_light(const Light& light, const SurfacePoint& x_1) {
+    return light.instance == x_1.instance && light.primitive == x_1.primitive;
+}
+
+// `dist_squared` and `normal` (at y_0) are not looked at when the light is infinite.
+VLP_HD inline LightEnd light_end(const SceneView& scene, uint32_t light_index, const SurfacePoint& x_1, Vec3 y_0,
+                                 Vec3 normal, Vec3 direction, float dist_squared) {
     const Light& light = scene.lights[light_index];
     const float choice = pdf_choose_light(scene, light_index);
     const EmissionPdf emission = pdf_emission(scene, light, y_0, normal, -direction);
-    const float next_event = is_delta(light) ? 1.0f : pdf_next_event(scene, light, x_1, y_0, normal, direction);
+    float next_event = is_delta(light) ? 1.0f : 0.0f;
+    if (!is_delta(light) && !is_on_light(light, x_1)) {
+        next_event = pdf_next_event(scene, light, x_1.position, y_0, normal, direction);
+    }
     if (is_infinite(light)) return {choice * emission.direction, choice * next_event, emission.position};
     const float per_area = is_delta(light) ? 1.0f : abs_dot(normal, direction) / dist_squared;
     return {choice * emission.position, choice * next_event * per_area, emission.direction / dist_squared};

@@ -10,8 +10,8 @@ namespace vlp {
 
 // Traces light path `path` of an iteration into slots[0 ... L - 1], y_1 first; slots past its end are marked not valid.
 // Returns how many of them can be connected. `stream` keeps the pilot's paths apart from the render's.
-VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettings& pass, Stream stream, uint32_t iteration,
-                                        uint32_t path, LightVertex* slots) {
+VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettings& pass, Stream stream,
+                                        uint32_t iteration, uint32_t path, LightVertex* slots) {
     for (uint32_t i = 0; i < pass.light_path_length; ++i) slots[i].packed = 0;
     if (scene.light_count == 0) return 0;
 
@@ -40,7 +40,7 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
     uint32_t connectible = 0;
     for (uint32_t i = 1; i <= pass.light_path_length; ++i) {
         const uint32_t key = hash(seed ^ path, k_transparency_stream, i);
-        const Step step = walk(scene, ray, from.id, false, key, [](const Ray&, Rgb) {});
+        const Step step = walk(scene, ray, from.id, false, key, NoLights{});
         if (!step.found) break;
         throughput *= step.throughput;
         const SurfacePoint& y = step.surface;
@@ -60,8 +60,8 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
         }
         if (!(vertex.pdf_area > 0) || !is_finite(vertex.pdf_area) || !is_finite(vertex.rev_geometry)) break;
         if (i == 1) {
-            const LightEnd end = light_end(scene, choice.index, y.position, emission.position, emission.normal,
-                                           -ray.direction, edge.dist_squared);
+            const LightEnd end = light_end(scene, choice.index, y, emission.position, emission.normal, -ray.direction,
+                                           edge.dist_squared);
             vertex.next_event_ratio = end.pdf_emission > 0 ? end.pdf_next_event / end.pdf_emission : 0.0f;
         }
 

@@ -2,78 +2,10 @@
 #pragma once
 
 #include "camera/projection.h"
-#include "integrator/light_density.h"
-#include "integrator/virtual_light_points.h"
+#include "integrator/light_hits.h"
+#include "integrator/next_event.h"
 
 namespace vlp {
-
-// A light that the walk's ray met at y_0 = z_{t-1}, seen from the walk's last vertex z_{t-2} (strategy s = 0).
-VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye, Rgb throughput,
-                                     float pdf_solid_angle, uint32_t light_index, Vec3 position, Vec3 normal,
-                                     Vec3 direction) {
-    const Light& light = scene.lights[light_index];
-    const uint32_t t = eye.t + 1;
-    Contribution c{.s = 0, .t = t, .value = throughput * emitted(scene, light, position, normal, -direction)};
-    c.weight = 1;
-    c.light = light_index;
-    c.position = is_infinite(light) ? direction : position;
-    c.normal = normal;
-    if (is_black(c.value) || t == 2) return c;  // only the eye walk itself sees a light directly
-
-    const Vec3 x_1 = eye.surface.position;
-    const float dist_squared = length_squared(position - x_1);
-    const float eye_pdf =
-        is_infinite(light) ? pdf_solid_angle : pdf_solid_angle * abs_dot(normal, direction) / dist_squared;
-    const LightEnd end = light_end(scene, light_index, x_1, position, normal, direction, dist_squared);
-    StrategySum sum = strategy_sum(pass, 0);
-    if (!eye.last().specular) sum.add(end.pdf_next_event / eye_pdf, strategy_count(pass, 1));
-    const float cos_x_1 = abs_dot(eye.surface.geometric_normal, direction);
-    const float ratio = end.pdf_emission / eye_pdf * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
-    add_longer_light_walks(sum, pass, eye.vertices, t, 2, ratio, eye.last().rev_ratio);
-    c.weight = sum.weight();
-    return c;
-}
-
-// Next event at z_{t-1}: one of the S samples of a light (strategy s = 1).
-VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye,
-                                        const Bsdf& bsdf, uint32_t u_light, Vec2 u) {
-    Contribution found{.s = 1, .t = eye.t};
-    const DiscreteSample choice = choose_light(scene, u_light);
-    const Light& light = scene.lights[choice.index];
-    const Vec3 x_1 = eye.surface.position;
-    const NextEvent event = sample_next_event(scene, light, x_1, u);
-    if (!event.valid()) return found;
-    found.light = choice.index;
-    found.position = is_infinite(light) ? event.direction : event.position;
-    found.normal = event.normal;
-    const float cos_x_1 = abs_dot(eye.surface.geometric_normal, event.direction);
-    const LobeValue at_x_1 = evaluate(bsdf, eye.w_eye, event.direction);
-    if (!(cos_x_1 > 0) || is_black(at_x_1.f)) return found;
-
-    const Anchor from = anchor_of(eye.surface);
-    const Rgb through =
-        is_infinite(light)
-            ? transmittance(scene, Ray{leave(from, event.direction), event.direction}, from.id, {})
-            : transmittance(scene, from, Anchor{event.position, event.normal, event.surface}, event.direction);
-    if (is_black(through)) return found;
-    const float pdf_next_event = choice.pdf * event.pdf_solid_angle;
-    found.value = eye.throughput * at_x_1.f * event.radiance * through * (cos_x_1 / pdf_next_event);
-
-    const uint32_t n = eye.t + 1;
-    const float dist_squared = event.distance * event.distance;
-    StrategySum sum = strategy_sum(pass, 1);
-    if (!event.delta && n <= pass.eye_path_length + 1) {
-        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0));
-    }
-    if (pass.light_path_length > 0 && eye.t > 2) {
-        const LightEnd end =
-            light_end(scene, choice.index, x_1, event.position, event.normal, event.direction, dist_squared);
-        const float ratio = end.pdf_emission / end.pdf_next_event * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
-        add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, at_x_1.pdf_eye * eye.last().rev_geometry);
-    }
-    found.weight = sum.weight();
-    return found;
-}
 
 // The radiance that one path through pixel (x, y) of the full picture finds, y counted from the bottom. Each strategy's
 // share goes to sink.add(Contribution), each vertex of the walk to sink.visit(EyeWalk). Returns the pixel's alpha.
@@ -90,7 +22,6 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
     float pdf_solid_angle = 1;  // of the direction that the walk took last
     PrimitiveId skip{};
     Anchor from{};
-    float alpha = 1;
     const bool has_vlps = pass.kappa > 0 && cache.stored_count > 0 && pass.vlp_connections > 0;
     // Every step draws from dimensions of its own, so that a path's later draws do not shift with its earlier ones.
     const uint32_t draws_per_step = 4 + 2 * pass.light_samples + pass.vlp_connections;
@@ -99,34 +30,16 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         sampler.dimension = 2 + (hits - 1) * draws_per_step;
         const bool from_camera = eye.t == 1;
         const uint32_t key = hash(seed ^ iteration, k_transparency_stream, hits);
-        const auto find_lamps = [&](const Ray& stretch, Rgb through) {
-            for_each_lamp_hit(scene, stretch, [&](uint32_t light, float, Vec3 position, Vec3 normal) {
-                if (from_camera && !(scene.lights[light].visibility & k_visible_to_camera)) return;
-                sink.add(hit_light(scene, pass, eye, eye.throughput * through, pdf_solid_angle, light, position, normal,
-                                   ray.direction));
-            });
-        };
-        const Step step = walk(scene, ray, skip, from_camera, key, find_lamps);
-        const Rgb throughput = eye.throughput * step.throughput;
+        const LightHits<Sink> lights{scene, pass, eye, ray.direction, pdf_solid_angle, sink};
+        const Step step = walk(scene, ray, skip, from_camera, key, lights);
         if (!step.found) {
             if (from_camera && pass.transparent_film) return 0;
-            for_each_infinite_light(scene, ray.direction, [&](uint32_t light) {
-                if (from_camera && !(scene.lights[light].visibility & k_visible_to_camera)) return;
-                sink.add(
-                    hit_light(scene, pass, eye, throughput, pdf_solid_angle, light, {}, -ray.direction, ray.direction));
-            });
+            lights.on_escape(step.throughput);
             break;
-        }
-        const SurfacePoint& z = step.surface;
-        const uint32_t emitter = light_of_surface(scene, z.instance, z.primitive);
-        if (emitter != k_none) {
-            const Vec3 normal = face_toward(z.geometric_normal, -ray.direction);
-            sink.add(hit_light(scene, pass, eye, throughput, pdf_solid_angle, emitter, z.position, normal, ray.direction));
-        } else if (!is_black(scene.materials[z.material].emission)) {  // an emitter that only hits can find
-            sink.add({.s = 0, .t = eye.t + 1, .value = throughput * scene.materials[z.material].emission, .weight = 1});
         }
 
         // z becomes the walk's last vertex.
+        const SurfacePoint& z = step.surface;
         const VertexDensity& previous = eye.last();
         const float dist_squared = length_squared(z.position - (from_camera ? ray.origin : from.position));
         VertexDensity& vertex = eye.vertices[eye.t];
@@ -137,10 +50,9 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         vertex.specular = false;
         if (!(vertex.pdf_area > 0) || !is_finite(vertex.pdf_area) || !is_finite(vertex.rev_geometry)) break;
         ++eye.t;
-        eye.throughput = throughput;
+        eye.throughput *= step.throughput;
         eye.surface = z;
         eye.w_eye = -ray.direction;
-
         sink.visit(eye);
 
         const Bsdf bsdf = make_bsdf(scene, z);
@@ -178,7 +90,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         ray = {leave(from, next.direction), next.direction};
         skip = from.id;
     }
-    return alpha;
+    return 1;
 }
 
 // Sums up what a pixel's path finds, leaving out estimates that are not finite.

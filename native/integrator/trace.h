@@ -34,12 +34,19 @@ struct Step {
     Rgb throughput = rgb(1);
 };
 
+// A walk that looks for no light on its way.
+struct NoLights {
+    VLP_HD void on_stretch(const Ray&, Rgb) const {}
+    VLP_HD void on_surface(const SurfacePoint&, Rgb) const {}
+};
+
 // Follows a ray to the next surface that is not passed through. Whether a partly transparent surface is passed is decided
-// at random from `key`, so passing is no scattering: such a surface is no vertex of the path. `on_free_stretch(ray,
-// throughput)` is called for each stretch of the way, whose t_max is where it ends.
-template <typename F>
+// at random from `key`, so passing is no scattering: such a surface is no vertex of the path. `lights.on_stretch(ray,
+// throughput)` is called for each free stretch of the way, whose t_max is where it ends, and `lights.on_surface` for each
+// surface that is met, passed or not.
+template <typename Lights>
 VLP_HD inline Step walk(const SceneView& scene, Ray ray, PrimitiveId skip, bool from_camera, uint32_t key,
-                        F&& on_free_stretch) {
+                        const Lights& lights) {
     Step step;
     const float t_end = ray.t_max;
     float travelled = 0;
@@ -47,21 +54,19 @@ VLP_HD inline Step walk(const SceneView& scene, Ray ray, PrimitiveId skip, bool 
         const Hit hit = closest_hit(scene, ray, skip);
         Ray stretch = ray;
         if (hit.found()) stretch.t_max = hit.t;
-        on_free_stretch(stretch, step.throughput);
+        lights.on_stretch(stretch, step.throughput);
         if (!hit.found()) return step;
         step.surface = surface_at(scene, ray, hit);
-        const Material& material = scene.materials[step.surface.material];
-        const bool hidden = from_camera && !(scene.instances[hit.instance].visibility & k_visible_to_camera);
-        if (!hidden && material.pass_through <= 0) {
-            step.found = true;
-            return step;
+        if (!from_camera || (scene.instances[hit.instance].visibility & k_visible_to_camera)) {
+            lights.on_surface(step.surface, step.throughput);
+            const Material& material = scene.materials[step.surface.material];
+            step.found = material.pass_through <= 0 || unit_float(hash(key, static_cast<uint32_t>(i))) >= material.pass_through;
+            if (step.found) {
+                step.throughput *= 1.0f / (1.0f - material.pass_through);
+                return step;
+            }
+            step.throughput *= material.transparency * (1.0f / material.pass_through);
         }
-        if (!hidden && unit_float(hash(key, static_cast<uint32_t>(i))) >= material.pass_through) {
-            step.throughput *= 1.0f / (1.0f - material.pass_through);
-            step.found = true;
-            return step;
-        }
-        if (!hidden) step.throughput *= material.transparency * (1.0f / material.pass_through);
         travelled += hit.t;
         ray.origin = leave(anchor_of(step.surface), ray.direction);
         ray.t_max = t_end - travelled;

@@ -3,12 +3,13 @@
 
 #include "light/light_data.h"
 #include "light/sphere_shape.h"
+#include "light/spherical_triangle.h"
 
 namespace vlp {
 
 VLP_HD inline Vec3 triangle_point(const Light& light, Vec2 u) {
-    // Uniform without a square root, folding the unit square along its diagonal's normal (Heitz 2019, "A Low-Distortion Map
-    // Between Triangle and Square").
+    // Uniform without a square root, folding the unit square along its diagonal's normal (Heitz 2019, "A Low-Distortion
+    // Map Between Triangle and Square").
     const Vec2 b = u.x < u.y ? Vec2{0.5f * u.x, u.y - 0.5f * u.x} : Vec2{u.x - 0.5f * u.y, 0.5f * u.y};
     return light.position + light.axis_u * b.x + light.axis_v * b.y;
 }
@@ -57,20 +58,46 @@ VLP_HD inline EmissionPdf surface_pdf_emission(const Light& light, Vec3 position
     return {1 / light.area, share * cosine * k_inv_pi};
 }
 
+// Next event draws by area from a triangle that fills fewer steradians than this, by solid angle from others. Measured:
+// by area, the cosine and the distance alone then vary by a third of their mean at most grazing views, and drawing by
+// angle costs less than a tenth of a shadow ray more.
+inline constexpr float k_min_triangle_angle = 0.02f;
+
+VLP_HD inline SphericalTriangle triangle_seen_from(const Light& light, Vec3 receiver) {
+    const Vec3 a = light.position - receiver;
+    return make_spherical_triangle(a, a + light.axis_u, a + light.axis_v, light.normal * (2 * light.area));
+}
+
+// False for a receiver at a corner, where the angle has no meaning.
+VLP_HD inline bool by_solid_angle(const SphericalTriangle& s) {
+    constexpr float k_tangent = 0.5f * k_min_triangle_angle;  // of half the angle, which is small
+    return s.above > k_tangent * s.below;
+}
+
 VLP_HD inline NextEvent triangle_sample_next_event(const Light& light, Vec3 receiver, Vec2 u) {
     NextEvent e;
-    e.position = triangle_point(light, u);
-    const Vec3 to_light = e.position - receiver;
-    e.distance = length(to_light);
-    if (e.distance == 0) return e;
-    e.direction = to_light / e.distance;
+    const SphericalTriangle seen = triangle_seen_from(light, receiver);
+    if (by_solid_angle(seen)) {
+        const float angle = solid_angle(seen);
+        e.direction = sample(seen, angle, u);
+        e.distance = dot(light.position - receiver, light.normal) / dot(e.direction, light.normal);
+        e.position = receiver + e.distance * e.direction;
+        e.pdf_solid_angle = is_finite(e.distance) ? 1 / angle : 0.0f;
+    } else {
+        e.position = triangle_point(light, u);
+        const Vec3 to_light = e.position - receiver;
+        e.distance = length(to_light);
+        e.direction = to_light / e.distance;
+        e.pdf_solid_angle = to_solid_angle(1 / light.area, square(e.distance), abs_dot(light.normal, e.direction));
+    }
     e.normal = face_toward(light.normal, -e.direction);
     e.radiance = light.radiance;
-    e.pdf_solid_angle = to_solid_angle(1 / light.area, square(e.distance), -dot(e.normal, e.direction));
     return e;
 }
 
 VLP_HD inline float triangle_pdf_next_event(const Light& light, Vec3 receiver, Vec3 position, Vec3 direction) {
+    const SphericalTriangle seen = triangle_seen_from(light, receiver);
+    if (by_solid_angle(seen)) return 1 / solid_angle(seen);
     return to_solid_angle(1 / light.area, length_squared(position - receiver), abs_dot(light.normal, direction));
 }
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import vlp_bpt
 
-from .errors import Cancelled, Error
+from .errors import Cancelled, SceneError
 from .images import Depth, Image, check_output
 from .render import CancelFlag, Progress, Renderer
 from .scene import Scene
@@ -24,7 +24,7 @@ from .snapshot import Snapshot
 Report = Callable[[Renderer, Progress], None]
 
 
-class BlenderError(Error):
+class BlenderError(SceneError):
     """A .blend file cannot be read or rendered here: names the file or what is missing."""
 
 
@@ -63,6 +63,8 @@ def render_blend(
                 if progress is not None:
                     progress(now)
 
+            if any(renderer.interrupted for renderer in result.renderers):
+                raise Cancelled("interrupted in an earlier view layer")
             result.renderers.append(self)
             return super().render(both, cancel)
 
@@ -106,14 +108,13 @@ def _open(path: Path, frame: int | None, values: dict[str, Any]) -> Any:
         text = "rendering a .blend needs Blender as a Python module (pip install bpy), or run it inside Blender: "
         raise BlenderError(f"'{path}': {text}blender -b {path} -E VLP_BPT -f 1 ({error})") from error
     addon = _find_addon(path)
-    with _console() as said:
+    with _console():
         if not hasattr(bpy.types.Scene, "vlp_bpt"):
             addon.register()
         try:
             bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
         except RuntimeError as error:
             raise BlenderError(f"'{path}': Blender cannot open it: {_one_line(str(error))}") from error
-    del said
     scene = bpy.context.scene
     scene.render.engine = "VLP_BPT"
     for name in sorted(values, key=lambda name: name != "mode"):  # the mode first: it sets others
@@ -162,7 +163,7 @@ def _render(bpy: Any, path: Path, renderer: type[Any], warnings: list[str], *, w
 
 def _one_line(text: str) -> str:
     lines = [line.strip().removeprefix("Error: ").removeprefix("VLP-BPT: ") for line in text.splitlines()]
-    return "; ".join(line for line in lines if line)
+    return "; ".join(dict.fromkeys(line for line in lines if line))
 
 
 @contextmanager

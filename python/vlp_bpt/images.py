@@ -16,6 +16,7 @@ from .errors import ImageError
 from .metrics import srgb_decode, srgb_encode
 
 _PREFIX = "vlp:"  # of this package's attributes, each holding one JSON value
+_BLENDER_PREFIX = "VLP_BPT."  # of what the add-on stamps into files that Blender writes, plain text
 _HALF_MAX = 65504.0
 _STATE = "vlp_bpt.sums"  # the part of an EXR file that holds a film state
 _STATE_CHANNELS = tuple(f"sum.{i:02}" for i in range(16))  # file order is alphabetical
@@ -123,6 +124,7 @@ def read_image(path: str | Path) -> Image:
             known = {name: json.loads(value) for name, value in known.items()}
         except ValueError:
             raise ImageError(f"'{path}': its VLP-BPT metadata is damaged") from None
+        known |= {name: str(value) for name, value in metadata.items() if name.startswith(_BLENDER_PREFIX)}
         pixels = _to_rgba(raw.reshape(spec.height, spec.width, spec.nchannels), list(spec.channelnames))
         if spec.format.basetype in (oiio.UINT8, oiio.UINT16, oiio.UINT32):
             pixels[..., :3] = srgb_decode(pixels[..., :3]) * pixels[..., 3:]

@@ -1,4 +1,4 @@
-// Cameras: rays and projections are each other's inverse, and splatting light onto the film equals tracing rays from it.
+// Cameras: rays and projections are inverses of each other, and splatting light onto the film equals tracing rays.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -7,10 +7,10 @@
 #include "camera/projection.h"
 #include "goodness_of_fit.h"
 
-namespace vlp::test {
+namespace vlp::testing {
 namespace {
 
-constexpr uint64_t k_seed = 20240615;
+constexpr uint32_t k_seed = 20240615;
 
 struct NamedCamera {
     std::string name;
@@ -20,7 +20,8 @@ struct NamedCamera {
 std::vector<NamedCamera> cameras() {
     CameraParameters p;
     const Frame f = make_frame(normalize(Vec3{0.2f, -0.9f, 0.4f}));
-    const Vec3 columns[4] = {f.tangent * 2.0f, f.bitangent * -0.5f, f.normal * 3.0f, {1, 2, -3}};  // scaled and mirrored
+    const Vec3 columns[4] = {
+        f.tangent * 2.0f, f.bitangent * -0.5f, f.normal * 3.0f, {1, 2, -3}};  // scaled and mirrored
     for (int j = 0; j < 4; ++j) {
         p.transform.m[0][j] = columns[j].x, p.transform.m[1][j] = columns[j].y, p.transform.m[2][j] = columns[j].z;
     }
@@ -75,19 +76,20 @@ TEST(CameraRays, LookWhereTheyShould) {
 }
 
 TEST(CameraRays, StayBetweenTheClipPlanesAndMeetInTheFocus) {
-    Random random(k_seed);
+    Random random{k_seed};
     for (const NamedCamera& c : cameras()) {
         SCOPED_TRACE(c.name);
         const Vec2 film{3.3f, 1.7f};
         Vec3 focus;
         float radius2 = 0;
         for (int i = 0; i < 1000; ++i) {
-            const Ray ray = sample_ray(c.camera, film, uniform_2d(random));
+            const Ray ray = sample_ray(c.camera, film, random.next_2d());
             EXPECT_NEAR(length(ray.direction), 1, 1e-6);
             EXPECT_NEAR(depth_of(c.camera, ray.origin), c.camera.clip_start, 1e-5);
             EXPECT_NEAR(depth_of(c.camera, ray.origin + ray.t_max * ray.direction), c.camera.clip_end, 2e-5);
             const float cosine = cosine_to_view(c.camera, ray.direction);
-            const Vec3 at_focus = ray.origin + ray.direction * ((c.camera.focus_distance - c.camera.clip_start) / cosine);
+            const Vec3 at_focus =
+                ray.origin + ray.direction * ((c.camera.focus_distance - c.camera.clip_start) / cosine);
             if (i == 0) focus = at_focus;
             EXPECT_LT(length(at_focus - focus), 1e-5f);
             const Vec3 lens = ray.origin - ray.direction * distance_from_lens(c.camera, ray);
@@ -96,19 +98,20 @@ TEST(CameraRays, StayBetweenTheClipPlanesAndMeetInTheFocus) {
             const Vec3 lens_center = middle.origin - middle.direction * distance_from_lens(c.camera, middle);
             radius2 = max_of(radius2, length_squared(lens - lens_center));
         }
-        EXPECT_NEAR(std::sqrt(radius2), c.camera.aperture_radius, 0.02 * static_cast<double>(c.camera.aperture_radius) + 1e-5);
+        EXPECT_NEAR(std::sqrt(radius2), c.camera.aperture_radius,
+                    0.02 * static_cast<double>(c.camera.aperture_radius) + 1e-5);
     }
 }
 
 TEST(CameraRays, ProjectionInvertsThem) {
-    Random random(k_seed);
+    Random random{k_seed};
     for (const NamedCamera& c : cameras()) {
         SCOPED_TRACE(c.name);
         for (int i = 0; i < 5000; ++i) {
-            const Vec2 film{12 * uniform(random) - 2, 9 * uniform(random) - 2};
-            const Vec2 lens = sample_lens(c.camera, uniform_2d(random));
+            const Vec2 film{12 * random.next() - 2, 9 * random.next() - 2};
+            const Vec2 lens = sample_lens(c.camera, random.next_2d());
             const Ray ray = camera_ray(c.camera, film, lens);
-            const float t = 10 * uniform(random);
+            const float t = 10 * random.next();
             const FilmProjection back = project(c.camera, lens, ray.origin + t * ray.direction);
             ASSERT_EQ(back.valid, t <= ray.t_max);
             if (!back.valid) continue;
@@ -130,10 +133,10 @@ TEST(CameraRays, ProjectionInvertsThem) {
     }
 }
 
-// A tilted plane that passes both clip planes shines with a radiance that varies; every pixel is measured by rays and by
-// splats of points that are uniform on the plane. 160 comparisons of 5 standard errors: a false-alarm rate of 1e-4.
+// A tilted plane that passes both clip planes shines with a radiance that varies; every pixel is measured by rays and
+// by splats of points that are uniform on the plane. 160 comparisons of 5 standard errors: a false-alarm rate of 1e-4.
 TEST(CameraRays, SplattingLightEqualsTracingRays) {
-    Random random(k_seed);
+    Random random{k_seed};
     for (const NamedCamera& c : cameras()) {
         SCOPED_TRACE(c.name);
         const Affine& m = c.camera.camera_to_world;
@@ -146,8 +149,8 @@ TEST(CameraRays, SplattingLightEqualsTracingRays) {
         std::vector<double> splat(pixels), splat2(pixels);
         constexpr int k_points = 1500000, k_rays = 40000;
         for (int i = 0; i < k_points; ++i) {
-            const float x = k_half * (2 * uniform(random) - 1), y = k_half * (2 * uniform(random) - 1);
-            const FilmProjection p = project(c.camera, sample_lens(c.camera, uniform_2d(random)), center + u * x + v * y);
+            const float x = k_half * (2 * random.next() - 1), y = k_half * (2 * random.next() - 1);
+            const FilmProjection p = project(c.camera, sample_lens(c.camera, random.next_2d()), center + u * x + v * y);
             if (!p.valid || !(p.film.x >= 0 && p.film.y >= 0)) continue;
             const uint32_t px = static_cast<uint32_t>(p.film.x), py = static_cast<uint32_t>(p.film.y);
             if (px >= width || py >= c.camera.height) continue;
@@ -159,11 +162,12 @@ TEST(CameraRays, SplattingLightEqualsTracingRays) {
         for (uint32_t i = 0; i < pixels; ++i) {
             double rays = 0, rays2 = 0;
             for (int k = 0; k < k_rays; ++k) {
-                const Vec2 film = Vec2{static_cast<float>(i % width), static_cast<float>(i / width)} + uniform_2d(random);
-                const Ray ray = sample_ray(c.camera, film, uniform_2d(random));
+                const Vec2 film = Vec2{static_cast<float>(i % width), static_cast<float>(i / width)} + random.next_2d();
+                const Ray ray = sample_ray(c.camera, film, random.next_2d());
                 const float t = dot(center - ray.origin, normal) / dot(ray.direction, normal);
                 const Vec3 p = ray.origin + t * ray.direction - center;
-                if (!(t > 0 && t < ray.t_max) || std::fabs(dot(p, u)) > k_half || std::fabs(dot(p, v)) > k_half) continue;
+                if (!(t > 0 && t < ray.t_max) || std::fabs(dot(p, u)) > k_half || std::fabs(dot(p, v)) > k_half)
+                    continue;
                 const double w = static_cast<double>(radiance(dot(p, u), dot(p, v)));
                 rays += w, rays2 += w * w;
             }
@@ -200,4 +204,4 @@ TEST(CameraRays, SenselessCamerasAreRefused) {
 }
 
 }  // namespace
-}  // namespace vlp::test
+}  // namespace vlp::testing

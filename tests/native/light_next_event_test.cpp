@@ -3,10 +3,10 @@
 
 #include "light_scenes.h"
 
-namespace vlp::test {
+namespace vlp::testing {
 namespace {
 
-constexpr uint64_t k_seed = 20240611;
+constexpr uint32_t k_seed = 20240611;
 
 struct Receiver {
     const char* name;
@@ -30,8 +30,8 @@ DirectionMap directions_toward(LightScene& s, Vec3 receiver, Random& random) {
     const bool sphere = s.light.kind != LightKind::sun && s.light.radius > 0;
     const bool inside = sphere && length(k_light_position - receiver) < s.light.radius;
     for (int i = 0; i < 20000; ++i) {
-        const NextEvent e = sample_next_event(s.scene(), s.light, receiver, uniform_2d(random));
-        if (e.valid()) found.push_back(e.direction), sum += e.direction;
+        const NextEvent e = sample_next_event(s.scene(), s.light, receiver, random.next_2d());
+        if (e.drawn()) found.push_back(e.direction), sum += e.direction;
     }
     if (found.empty() || inside || length(sum) < 0.05f * static_cast<float>(found.size())) return all;
     all.frame = make_frame(normalize(sum));
@@ -41,22 +41,23 @@ DirectionMap directions_toward(LightScene& s, Vec3 receiver, Random& random) {
     return all;
 }
 
-// 20 lights x 6 receivers, less those that can't be hit: about 90 fits of significance 1e-6, a false-alarm rate of 1e-4.
+// 20 lights x 6 receivers, less those that can't be hit: about 90 fits of significance 1e-6, a false-alarm rate of
+// 1e-4.
 TEST(LightNextEvent, SamplesFollowTheDensityOfHits) {
-    Random random(k_seed);
+    Random random{k_seed};
     for (LightScene& s : light_scenes()) {
         if (is_delta(s.light)) continue;
         for (const Receiver& r : receivers()) {
             SCOPED_TRACE(s.name + ", " + r.name);
             const DirectionMap map = directions_toward(s, r.position, random);
-            const auto draw = [&](float(&point)[2]) {
-                const NextEvent e = sample_next_event(s.scene(), s.light, r.position, uniform_2d(random));
-                if (!e.valid()) return false;
+            const auto draw = [&](float (&point)[2]) {
+                const NextEvent e = sample_next_event(s.scene(), s.light, r.position, random.next_2d());
+                if (!e.drawn()) return false;
                 const Vec2 p = map.point(e.direction);
                 point[0] = p.x, point[1] = p.y;
                 return true;
             };
-            const auto density = [&](const float(&point)[2]) {
+            const auto density = [&](const float (&point)[2]) {
                 const Vec3 d = map.direction({point[0], point[1]});
                 const LightHit hit = hit_light(s, {r.position, d});
                 if (!hit.found) return 0.0f;
@@ -74,14 +75,14 @@ TEST(LightNextEvent, SamplesFollowTheDensityOfHits) {
 }
 
 TEST(LightNextEvent, SamplesAgreeWithHits) {
-    Random random(k_seed);
+    Random random{k_seed};
     for (LightScene& s : light_scenes()) {
         for (const Receiver& r : receivers()) {
             SCOPED_TRACE(s.name + ", " + r.name);
             int missed = 0, valid = 0;
             for (int i = 0; i < 2000; ++i) {
-                const NextEvent e = sample_next_event(s.scene(), s.light, r.position, uniform_2d(random));
-                if (!e.valid()) continue;
+                const NextEvent e = sample_next_event(s.scene(), s.light, r.position, random.next_2d());
+                if (!e.drawn()) continue;
                 ++valid;
                 ASSERT_NEAR(length(e.direction), 1, 1e-5);
                 ASSERT_EQ(e.delta, is_delta(s.light));
@@ -126,6 +127,29 @@ TEST(LightNextEvent, SurfacesAreNamedAndLampsAreNot) {
     }
 }
 
+// Points that next event never draws have no density: the far side of a sphere from outside, the back of an area lamp,
+// and what lies outside the beam of a spread one.
+TEST(LightNextEvent, PointsNeverDrawnHaveNoDensity) {
+    const Vec3 o = k_light_position, axis = -turned({}).column(2), side = turned({}).column(0);
+    const auto pdf = [&](LightScene s, Vec3 receiver, Vec3 position, Vec3 normal) {
+        return pdf_next_event(s.scene(), s.light, receiver, position, normal, normalize(position - receiver));
+    };
+    const Vec3 receiver = o + axis * 2.0f;
+    for (const auto& light : {make_point(o, k_power, 0.5f), make_sphere(o, 0.5f, k_power, 0, 0)}) {
+        EXPECT_GT(pdf({"sphere", light, 0}, receiver, o + axis * 0.5f, axis), 0);
+        EXPECT_EQ(pdf({"sphere", light, 0}, receiver, o - axis * 0.5f, axis), 0);
+        EXPECT_GT(pdf({"sphere", light, 0}, o, o + axis * 0.5f, -axis), 0);
+    }
+    for (const bool ellipse : {false, true}) {
+        const LightScene lambertian("area", make_area(turned(o), k_power, 2, 2, ellipse, k_pi), 0);
+        const LightScene beam("beam", make_area(turned(o), k_power, 2, 2, ellipse, 0.4f), 0);
+        EXPECT_GT(pdf(lambertian, receiver, o + side * 0.9f, axis), 0);
+        EXPECT_EQ(pdf(lambertian, o - axis, o + side * 0.9f, axis), 0);
+        EXPECT_GT(pdf(beam, receiver, o + side * 0.2f, axis), 0);
+        EXPECT_EQ(pdf(beam, receiver, o + side * 0.9f, axis), 0);
+    }
+}
+
 // Irradiance of a small surface at `receiver` that faces `normal`, green channel, with its standard error.
 struct Estimate {
     double mean = 0, error = 0;
@@ -134,7 +158,7 @@ struct Estimate {
 Estimate irradiance(LightScene& s, Vec3 receiver, Vec3 normal, int draws, Random& random) {
     double sum = 0, squares = 0;
     for (int i = 0; i < draws; ++i) {
-        const NextEvent e = sample_next_event(s.scene(), s.light, receiver, uniform_2d(random));
+        const NextEvent e = sample_next_event(s.scene(), s.light, receiver, random.next_2d());
         const double cosine = static_cast<double>(dot(normal, e.direction));
         const double x = e.valid() && cosine > 0 ? static_cast<double>(e.radiance.g / e.pdf_solid_angle) * cosine : 0;
         sum += x, squares += x * x;
@@ -145,7 +169,7 @@ Estimate irradiance(LightScene& s, Vec3 receiver, Vec3 normal, int draws, Random
 
 // Closed forms. 5 standard errors (6e-7 each) and 1e-4 for single precision.
 TEST(LightNextEvent, IrradianceEqualsClosedForms) {
-    Random random(k_seed);
+    Random random{k_seed};
     const double pi = 3.14159265358979323846, watts = 2;
     const Vec3 o = k_light_position, axis = -turned({}).column(2);
     const auto check = [&](LightScene s, Vec3 receiver, Vec3 normal, double truth) {
@@ -163,7 +187,8 @@ TEST(LightNextEvent, IrradianceEqualsClosedForms) {
         const double disc = watts / (pi * 0.25) / (1 + 4 * static_cast<double>(h * h));  // L pi R² / (R² + h²), R = 1/2
         check({"disc", make_area(turned(o), k_power, 1, 1, true, k_pi), 0}, o + axis * h, -axis, disc);
         // Form factor of a square of side 1 seen by a small parallel surface under its centre.
-        const double x = 0.5 / std::sqrt(0.25 + static_cast<double>(h * h)), a = std::atan(0.5 / std::sqrt(0.25 + static_cast<double>(h * h)));
+        const double x = 0.5 / std::sqrt(0.25 + static_cast<double>(h * h)),
+                     a = std::atan(0.5 / std::sqrt(0.25 + static_cast<double>(h * h)));
         check({"square", make_area(turned(o), k_power, 1, 1, false, k_pi), 0}, o + axis * h, -axis,
               watts / pi * 4 * x * a);
     }
@@ -177,4 +202,4 @@ TEST(LightNextEvent, IrradianceEqualsClosedForms) {
 }
 
 }  // namespace
-}  // namespace vlp::test
+}  // namespace vlp::testing

@@ -129,6 +129,13 @@ def test_many_fireflies_are_too_noisy_to_pass() -> None:
     assert any("too noisy" in failure for failure in compare(a, noise(rng, 16, 0.05)).failures)
 
 
+def test_regions_too_noisy_to_judge_are_a_failure() -> None:
+    rng = np.random.default_rng(12)
+    a, b = noise(rng, 8, 0.5), noise(rng, 8, 0.5)  # a region's standard error: 0.5 / 16 * sqrt(2 / 8) = 1.6 %
+    assert any("too noisy" in failure for failure in compare(a, b, most_noise=0.005).failures)
+    assert not compare(a, b, most_noise=0.03).failures
+
+
 def test_failure_writes_the_images_and_says_how_to_repeat(tmp_path: Path) -> None:
     rng = np.random.default_rng(9)
     comparison = compare(noise(rng, 8) * 1.5, noise(rng, 8))

@@ -173,8 +173,7 @@ def reference_halves(
     name: str, scene: Scene, seconds: float, threads: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Two independent REFERENCE pictures (h, w, 3), top row first, of `seconds` each; made once and kept."""
-    native = Path(load_native()._module.__file__ or "")
-    key = fingerprint([native], {"scene": scene_digest(scene), "seconds": seconds})
+    key = fingerprint([native_file()], {"scene": scene_digest(scene), "seconds": seconds})
 
     def make(index: int) -> NDArray[np.float32]:
         print(f"{name}: reference, half {index + 1} of 2, {seconds:.0f} s, kept in {FOLDER}/", flush=True)
@@ -185,6 +184,11 @@ def reference_halves(
 
     first, second = batches(f"{name}-reference", key, 2, make)
     return first.astype(np.float64), second.astype(np.float64)
+
+
+def native_file() -> Path:
+    """The native core's file: what a kept picture of ours depends on besides its scene and settings."""
+    return Path(load_native()._module.__file__)
 
 
 def conditions(args: argparse.Namespace) -> str:

@@ -1,0 +1,52 @@
+// Next event: an eye vertex joined to a point sampled on a light, the first sum of the paper's (7).
+#pragma once
+
+#include "integrator/light_density.h"
+#include "integrator/trace.h"
+#include "integrator/virtual_light_points.h"
+
+namespace vlp {
+
+// Next event at z_{t-1}: one of the S samples of a light (strategy s = 1).
+VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye,
+                                        const Bsdf& bsdf, uint32_t u_light, Vec2 u) {
+    Contribution found{.s = 1, .t = eye.t};
+    const DiscreteSample choice = choose_light(scene, u_light);
+    const Light& light = scene.lights[choice.index];
+    const SurfacePoint& x_1 = eye.surface;
+    if (is_on_light(light, x_1)) return found;
+    const NextEvent event = sample_next_event(scene, light, x_1.position, u);
+    if (!event.valid()) return found;
+    found.light = choice.index;
+    found.position = is_infinite(light) ? event.direction : event.position;
+    found.normal = event.normal;
+    const float cos_x_1 = abs_dot(x_1.geometric_normal, event.direction);
+    const LobeValue at_x_1 = evaluate(bsdf, eye.w_eye, event.direction);
+    if (!(cos_x_1 > 0) || is_black(at_x_1.f)) return found;
+
+    const Anchor from = anchor_of(x_1);
+    const Rgb through =
+        is_infinite(light)
+            ? transmittance(scene, Ray{leave(from, event.direction), event.direction}, from.id, {})
+            : transmittance(scene, from, Anchor{event.position, event.normal, event.surface}, event.direction);
+    if (is_black(through)) return found;
+    const float pdf_next_event = choice.pdf * event.pdf_solid_angle;
+    found.value = eye.throughput * at_x_1.f * event.radiance * through * (cos_x_1 / pdf_next_event);
+
+    const uint32_t n = eye.t + 1;
+    const float dist_squared = event.distance * event.distance;
+    StrategySum sum = strategy_sum(pass, 1);
+    if (!event.delta && n <= pass.eye_path_length + 1) {
+        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0));
+    }
+    if (pass.light_path_length > 0 && eye.t > 2) {
+        const LightEnd end =
+            light_end(scene, choice.index, x_1, event.position, event.normal, event.direction, dist_squared);
+        const float ratio = end.pdf_emission / end.pdf_next_event * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
+        add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, at_x_1.pdf_eye * eye.last().rev_geometry);
+    }
+    found.weight = sum.weight();
+    return found;
+}
+
+}  // namespace vlp

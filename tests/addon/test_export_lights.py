@@ -1,0 +1,189 @@
+"""Lamps in Blender's units, as `tests/addon/test_render.py` finds them against Cycles."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+import bpy_scenes as scenes
+import numpy as np
+import pytest
+
+from addon.export.notes import Notes
+from vlp_bpt.scene import AreaLight, PointLight, SpotLight, SunLight
+
+
+def only(kind: str, notes: Notes | None = None, **settings: Any) -> Any:
+    scenes.light(kind, **settings)
+    (light,) = scenes.export(notes).lights
+    return light
+
+
+def test_point() -> None:
+    light = only("POINT", energy=30, color=(1, 0.5, 0), shadow_soft_size=0.2)
+    assert isinstance(light, PointLight)
+    assert light.power == pytest.approx((30, 15, 0))
+    assert light.position == (0, 0, 2)
+    assert light.radius == pytest.approx(0.2)
+
+
+def test_spot() -> None:
+    light = only("SPOT", energy=30, spot_size=1.0, spot_blend=0.4, shadow_soft_size=0.0)
+    assert isinstance(light, SpotLight)
+    assert (light.spot_size, light.blend, light.radius) == pytest.approx((1.0, 0.4, 0.0))
+    assert light.power == (30, 30, 30)
+
+
+def test_a_spot_stretched_along_its_axis_is_narrower() -> None:
+    scenes.light("SPOT", spot_size=1.0).scale = (1, 1, 2)
+    (light,) = scenes.export().lights
+    assert math.tan(light.spot_size / 2) == pytest.approx(math.tan(0.5) / 2, rel=1e-5)
+    assert np.allclose(np.linalg.norm(light.transform[:, :3], axis=0), 1)
+
+
+def test_sun() -> None:
+    light = only("SUN", energy=3, angle=0.1)
+    assert isinstance(light, SunLight)
+    assert light.irradiance == (3, 3, 3)
+    assert light.angle == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    "shape, size, ellipse",
+    [("SQUARE", (2, 2), False), ("RECTANGLE", (2, 3), False), ("DISK", (2, 2), True), ("ELLIPSE", (2, 3), True)],
+)
+def test_area(shape: str, size: tuple[float, float], ellipse: bool) -> None:
+    light = only("AREA", energy=30, shape=shape, size=2, size_y=3, spread=1.0)
+    assert isinstance(light, AreaLight)
+    assert (light.size, light.ellipse, light.power) == (size, ellipse, (30, 30, 30))
+    assert light.spread == pytest.approx(1.0)
+
+
+def test_scale_makes_an_area_larger_at_the_same_power() -> None:
+    scenes.light("AREA", energy=30, size=2).scale = (3, 4, 5)
+    (light,) = scenes.export().lights
+    assert light.power == (30, 30, 30)
+    assert np.allclose(np.linalg.norm(light.transform[:, :2], axis=0) * light.size, (6, 8))
+
+
+@pytest.mark.parametrize(
+    "kind, settings, factor",
+    [
+        ("POINT", {"shadow_soft_size": 0.3}, 4 * math.pi * 0.09),
+        ("SPOT", {"shadow_soft_size": 0.0}, 4),
+        ("SUN", {"angle": 0.3}, math.pi * math.sin(0.15) ** 2),
+        ("SUN", {"angle": 0.0}, 1),
+        ("AREA", {"shape": "RECTANGLE", "size": 2, "size_y": 3}, 6),
+        ("AREA", {"shape": "DISK", "size": 2}, math.pi),
+    ],
+)
+def test_without_normalization(kind: str, settings: dict[str, Any], factor: float) -> None:
+    light = only(kind, energy=10, normalize=False, **settings)
+    power = light.irradiance if isinstance(light, SunLight) else light.power
+    assert power == pytest.approx((10 * factor,) * 3, rel=1e-6)
+
+
+def test_exposure_and_temperature() -> None:
+    light = only("POINT", energy=10, exposure=1, use_temperature=True, temperature=3000, color=(1, 0.5, 1))
+    tint = bpy.data.lights["Point"].temperature_color
+    assert light.power == pytest.approx((20 * tint[0], 10 * tint[1], 20 * tint[2]), rel=1e-5)
+    assert tint[0] > tint[2]
+
+
+def emission(lamp: Any) -> Any:
+    lamp.data.use_nodes = True
+    return next(node for node in lamp.data.node_tree.nodes if node.bl_idname == "ShaderNodeEmission")
+
+
+def test_the_constants_of_a_lamps_own_nodes() -> None:
+    node = emission(scenes.light("POINT", energy=10))
+    scenes.socket(node, "Color").default_value = (1, 0.5, 0.25, 1)
+    scenes.socket(node, "Strength").default_value = 3
+    (light,) = scenes.export().lights
+    assert light.power == pytest.approx((30, 15, 7.5))
+
+
+def test_unlinked_lamp_nodes_give_no_light() -> None:
+    lamp = scenes.light("POINT", energy=10)
+    emission(lamp)
+    lamp.data.node_tree.links.clear()
+    assert scenes.export().lights == []
+
+
+@pytest.mark.parametrize(
+    "settings, words", [({"size": 0.0}, "area is zero"), ({"shape": "RECTANGLE", "size_y": 0.0}, "area is zero")]
+)
+def test_areas_of_zero_are_left_out_and_named(settings: dict[str, Any], words: str) -> None:
+    scenes.light("AREA", **settings).name = "Flat"
+    notes = Notes()
+    assert scenes.export(notes).lights == []
+    assert len(notes.warnings) == 1
+    assert words in notes.warnings[0] and "'Flat'" in notes.warnings[0]
+
+
+def test_a_lamp_scaled_to_nothing_is_left_out() -> None:
+    scenes.light("AREA").scale = (0, 1, 1)
+    notes = Notes()
+    assert scenes.export(notes).lights == []
+    assert len(notes.warnings) == 1
+
+
+def test_lamps_without_power_are_left_out() -> None:
+    scenes.light("POINT", energy=0)
+    notes = Notes()
+    assert scenes.export(notes).lights == []
+    assert notes.warnings == []
+
+
+def test_negative_power_is_named() -> None:
+    notes = Notes()
+    scenes.light("POINT", energy=-5)
+    assert scenes.export(notes).lights == []
+    assert "negative" in notes.warnings[0]
+
+
+def test_lamps_in_collection_instances() -> None:
+    inner = bpy.data.collections.new("inner")
+    inner.objects.link(bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT")))
+    for index in range(3):
+        empty = scenes.link(f"empty{index}", None)
+        empty.instance_type, empty.instance_collection = "COLLECTION", inner
+        empty.location.x = index
+    assert sorted(light.position[0] for light in scenes.export().lights) == [0, 1, 2]
+
+
+def world(**values: Any) -> Any:
+    made = bpy.data.worlds.new("World")
+    made.use_nodes = True
+    bpy.context.scene.world = made
+    node = next(node for node in made.node_tree.nodes if node.bl_idname == "ShaderNodeBackground")
+    for name, value in values.items():
+        scenes.socket(node, name).default_value = value
+    return made
+
+
+def test_world_colour_and_strength() -> None:
+    world(Color=(0.1, 0.2, 0.3, 1), Strength=2)
+    assert scenes.export().world.radiance == pytest.approx((0.2, 0.4, 0.6))
+
+
+def test_no_world_is_black() -> None:
+    bpy.context.scene.world = None
+    assert scenes.export().world.radiance == (0, 0, 0)
+
+
+def test_a_world_without_surface_is_black() -> None:
+    world().node_tree.links.clear()
+    assert scenes.export().world.radiance == (0, 0, 0)
+
+
+def test_a_textured_world_is_reported_once() -> None:
+    made = world(Color=(0.5, 0.5, 0.5, 1))
+    node = next(node for node in made.node_tree.nodes if node.bl_idname == "ShaderNodeBackground")
+    sky = made.node_tree.nodes.new("ShaderNodeTexSky")
+    made.node_tree.links.new(sky.outputs[0], scenes.socket(node, "Color"))
+    notes = Notes()
+    assert scenes.export(notes).world.radiance == pytest.approx((0.5, 0.5, 0.5))
+    assert len(notes.warnings) == 1
+    assert "Sky Texture" in notes.warnings[0] and "World 'World'" in notes.warnings[0]
