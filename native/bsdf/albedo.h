@@ -25,7 +25,7 @@ inline constexpr uint32_t k_albedo_table_size = k_dielectric_rise + k_coarse * k
 
 struct GridPosition {
     uint32_t index;  // of the lower node
-    float t;         // share of the upper one
+    float t;  // share of the upper one
 };
 
 VLP_HD inline GridPosition grid_position(float x, uint32_t count) {
@@ -80,11 +80,12 @@ VLP_HD inline float dielectric_rise(const float* tables, float alpha, float eta,
 // bounce being tinted by the average reflectance `fresnel` (Kulla & Conty 2017; Turquin 2019, "Practical multiple
 // scattering compensation for microfacet models", for its shape).
 VLP_HD inline Rgb compensation(Albedo e, Rgb fresnel) {
-    const float missing = (1.0f - e.directional) / max_of(e.directional, 1e-4f);
-    const float kept = 1.0f - e.average;
-    return {1.0f + missing * fresnel.r * e.average / (1.0f - fresnel.r * kept),
-            1.0f + missing * fresnel.g * e.average / (1.0f - fresnel.g * kept),
-            1.0f + missing * fresnel.b * e.average / (1.0f - fresnel.b * kept)};
+    const float missing = (1.0f - e.directional) / max_of(e.directional, 1e-4f), lost = 1.0f - e.average;
+    const auto raise = [&](float f) {
+        const float reflected = min_of(f, 1.0f);  // colours may exceed 1, the series of bounces must not diverge
+        return 1.0f + missing * reflected * e.average / (1.0f - reflected * lost);
+    };
+    return {raise(fresnel.r), raise(fresnel.g), raise(fresnel.b)};
 }
 
 }  // namespace vlp

@@ -56,14 +56,17 @@ VLP_HD inline float passed_by_layers(const Bsdf& bsdf, const Lobe& lobe, float c
 // One finite lobe. Zero for specular ones.
 VLP_HD inline LobeValue evaluate(const Bsdf& bsdf, const Lobe& lobe, const DirectionPair& d) {
     switch (lobe.kind) {
-        case LobeKind::diffuse: return d.reflects() ? evaluate_diffuse(lobe.weight, d) : LobeValue{};
-        case LobeKind::translucent: return d.reflects() ? LobeValue{} : evaluate_diffuse(lobe.weight, d);
+        case LobeKind::diffuse:
+            return d.reflects() ? evaluate_diffuse(lobe.weight, d) : LobeValue{};
+        case LobeKind::translucent:
+            return d.reflects() ? LobeValue{} : evaluate_diffuse(lobe.weight, d);
         case LobeKind::reflection:
             return is_specular(lobe) ? LobeValue{} : evaluate_reflection(lobe, bsdf.tables, d);
         case LobeKind::dielectric:
         case LobeKind::refraction:
             return is_specular(lobe) ? LobeValue{} : evaluate_dielectric(lobe, bsdf.tables, d);
-        default: return {};
+        default:
+            return {};
     }
 }
 
@@ -135,9 +138,9 @@ VLP_HD inline BsdfSample sample_diffuse(const Bsdf& bsdf, Vec3 w_from, Walk walk
 // A direction chosen by a microfacet, or by the surface itself where the lobe is specular.
 struct MicrofacetSample {
     Vec3 direction;
-    Rgb share;       // of the light that takes this way, the lobe's weight left out (specular lobes only)
+    Rgb share;  // of the light that takes this way, the lobe's weight left out (specular lobes only)
     float mass = 0;  // probability of this way, 0: no direction
-    float eta = 1;   // index on the side of `direction` over the one on the side of `w_from`
+    float eta = 1;  // index on the side of `direction` over the one on the side of `w_from`
 };
 
 VLP_HD inline MicrofacetSample sample_microfacet(const Bsdf& bsdf, const Lobe& lobe, Vec3 w_from, float u_way, Vec2 u) {
@@ -193,8 +196,9 @@ VLP_HD inline BsdfSample sample(const Bsdf& bsdf, Vec3 w_from, Walk walk, float 
     if (bsdf.count == 0 || bsdf.lobes[chosen].selection <= 0) return {};
     const Lobe& lobe = bsdf.lobes[chosen];
     if (lobe.kind == LobeKind::diffuse || lobe.kind == LobeKind::translucent) {
-        const float from_g = dot(w_from, bsdf.geometric_normal), side = lobe.kind == LobeKind::diffuse ? from_g : -from_g;
-        const Vec3 w = sample_cosine(bsdf.normal, bsdf.geometric_normal, side, u);
+        const float from_g = dot(w_from, bsdf.geometric_normal);
+        const float toward = lobe.kind == LobeKind::diffuse ? from_g : -from_g;
+        const Vec3 w = sample_cosine(bsdf.normal, bsdf.geometric_normal, toward, u);
         return finite_sample(bsdf, w_from, w, walk);
     }
     const MicrofacetSample way = sample_microfacet(bsdf, lobe, w_from, u_lobe / lobe.selection, u);

@@ -34,8 +34,8 @@ VLP_HD inline LobeValue evaluate_dielectric(const Lobe& lobe, const float* table
     const float cos_eye = std::fabs(d.eye_s), cos_light = std::fabs(d.light_s);
 
     Vec3 h = d.eye + d.light * (reflects ? 1.0f : eta);
-    if (dot(h, normal) < 0) h = -h;
-    h = normalize(h);
+    if (length_squared(h) < k_min_half_squared) return {};
+    h = normalize(face_toward(h, normal));
     const float eye_h = dot(d.eye, h), light_h = dot(d.light, h);
     if (eye_h <= 0 || (light_h > 0) != reflects) return {};  // no microfacet that faces both joins the two
 
@@ -47,8 +47,8 @@ VLP_HD inline LobeValue evaluate_dielectric(const Lobe& lobe, const float* table
     const float visible_eye = visible_density(density, cos_eye, root_eye);
     const float visible_light = visible_density(density, cos_light, root_light);
     // D G2 / (cos_eye cos_light) * cos_light / |light.ng|
-    const float shape = 2.0f * density * cos_light /
-                        ((root_eye * cos_light + root_light * cos_eye) * std::fabs(d.light_g));
+    const float shape =
+        2.0f * density * cos_light / ((root_eye * cos_light + root_light * cos_eye) * std::fabs(d.light_g));
     LobeValue value;
     if (reflects) {
         value.f = split.reflect * (0.25f * shape);

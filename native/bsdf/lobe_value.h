@@ -15,9 +15,7 @@ struct DirectionPair {
     float eye_s, light_s;      // cosines with the shading normal
     float eye_g, light_g;      // cosines with the geometric normal
 
-    VLP_HD bool on_surface() const {
-        return std::fabs(eye_g) < k_min_cosine || std::fabs(light_g) < k_min_cosine;
-    }
+    VLP_HD bool on_surface() const { return std::fabs(eye_g) < k_min_cosine || std::fabs(light_g) < k_min_cosine; }
     VLP_HD bool reflects() const { return eye_g * light_g > 0; }
     // Each direction lies on the same side of the surface and of the shading frame (Veach 1997, 5.3: what the two do
     // not agree upon neither reflects nor refracts).

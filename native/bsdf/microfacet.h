@@ -5,6 +5,9 @@
 
 namespace vlp {
 
+// Half vectors shorter than this, squared, have no direction: both rays graze the surface from opposite ways.
+inline constexpr float k_min_half_squared = 1e-12f;
+
 // D of the unit microfacet normal `h` around the unit `normal`, per solid angle of h. The sine comes from a difference
 // of vectors: 1 - cos^2 has no digits left in narrow lobes.
 VLP_HD inline float ggx_d(float alpha2, Vec3 normal, Vec3 h) {

@@ -11,11 +11,16 @@ namespace vlp {
 
 VLP_HD inline Rgb reflectance(const Lobe& lobe, float cos_i) {
     switch (lobe.fresnel) {
-        case Fresnel::none: return lobe.f0;
-        case Fresnel::dielectric: return lobe.f0 * fresnel_dielectric(cos_i, lobe.eta);
-        case Fresnel::schlick: return fresnel_schlick(cos_i, lobe.f0, lobe.f82);
-        case Fresnel::conductor: return fresnel_conductor(cos_i, lobe.f0, lobe.f82);
-        default: return fresnel_tinted_dielectric(cos_i, lobe.eta, lobe.f0);
+        case Fresnel::none:
+            return lobe.f0;
+        case Fresnel::dielectric:
+            return lobe.f0 * fresnel_dielectric(cos_i, lobe.eta);
+        case Fresnel::schlick:
+            return fresnel_schlick(cos_i, lobe.f0, lobe.f82);
+        case Fresnel::conductor:
+            return fresnel_conductor(cos_i, lobe.f0, lobe.f82);
+        default:
+            return fresnel_tinted_dielectric(cos_i, lobe.eta, lobe.f0);
     }
 }
 
@@ -23,9 +28,12 @@ VLP_HD inline Rgb reflectance(const Lobe& lobe, float cos_i) {
 VLP_HD inline Rgb average_reflectance(const Lobe& lobe) {
     const Rgb f0 = lobe.f0;
     switch (lobe.fresnel) {
-        case Fresnel::none: return f0;
-        case Fresnel::dielectric: return f0 * average_fresnel_dielectric(lobe.eta);
-        case Fresnel::schlick: return average_fresnel_schlick(f0, schlick_edge(f0, lobe.f82));
+        case Fresnel::none:
+            return f0;
+        case Fresnel::dielectric:
+            return f0 * average_fresnel_dielectric(lobe.eta);
+        case Fresnel::schlick:
+            return average_fresnel_schlick(f0, schlick_edge(f0, lobe.f82));
         case Fresnel::conductor: {
             // Schlick's term with an edge factor, through the exact reflectances at 0 and near 82 degrees.
             const Rgb normal = fresnel_conductor(1, f0, lobe.f82), edge = fresnel_conductor(1.0f / 7, f0, lobe.f82);
@@ -58,7 +66,7 @@ VLP_HD inline Rgb layer_albedo(const Lobe& lobe, const float* tables, float cos_
         albedo = reflectance(lobe, cos_eye);
     }
     if (!lobe.compensate) return albedo;
-    // The tables' albedo already stands for the whole; what remains is the tint that many bounces add.
+    // That is the albedo of all bounces but for the tint which the second and later ones add.
     const Albedo e = ggx_albedo(tables, lobe.alpha, cos_eye);
     return albedo * compensation(e, average_reflectance(lobe)) * e.directional;
 }
@@ -67,13 +75,15 @@ VLP_HD inline LobeValue evaluate_reflection(const Lobe& lobe, const float* table
     if (!d.reflects() || !d.frames_agree()) return {};
     const Vec3 normal = d.eye_s < 0 ? -d.normal : d.normal;
     const float cos_eye = std::fabs(d.eye_s), cos_light = std::fabs(d.light_s);
-    const Vec3 h = normalize(d.eye + d.light);
+    Vec3 h = d.eye + d.light;
+    if (length_squared(h) < k_min_half_squared) return {};
+    h = normalize(h);
     const float alpha2 = square(lobe.alpha), density = ggx_d(alpha2, normal, h);
     const float root_eye = smith_root(alpha2, cos_eye), root_light = smith_root(alpha2, cos_light);
 
     // F D G2 / (4 cos_eye cos_light) * cos_light / |light.ng|
-    const float shape = 0.5f * density * cos_light /
-                        ((root_eye * cos_light + root_light * cos_eye) * std::fabs(d.light_g));
+    const float shape =
+        0.5f * density * cos_light / ((root_eye * cos_light + root_light * cos_eye) * std::fabs(d.light_g));
     LobeValue value;
     value.f = lobe.weight * reflectance(lobe, dot(d.eye, h)) * shape;
     if (lobe.compensate) value.f *= reflection_compensation(lobe, tables, cos_eye);

@@ -41,8 +41,8 @@ struct Material {
     bool has_specular = false;    // some lobe is a delta distribution
     bool has_finite = false;      // some lobe is not: the surface can be connected and hold VLPs
     float pass_through = 0;       // probability that a path goes straight through
-    Rgb transparency;             // what passes straight through, for connection rays; weight / pass_through for paths
-    Rgb emission;                 // radiance on both sides
+    Rgb transparency;  // what passes straight through, for connection rays; weight / pass_through for paths
+    Rgb emission;  // radiance on both sides
 };
 
 }  // namespace vlp

@@ -80,8 +80,10 @@ Rgb mean_albedo(const std::vector<Lobe>& lobes, const Lobe& lobe) {
             return albedo * max_of(average(mean), lobe.fresnel == Fresnel::none ? 0.0f : k_least_reflectance);
         }
         case LobeKind::dielectric:
-        case LobeKind::refraction: return albedo * lobe.f82;
-        default: return albedo;
+        case LobeKind::refraction:
+            return albedo * lobe.f82;
+        default:
+            return albedo;
     }
 }
 

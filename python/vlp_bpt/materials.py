@@ -105,9 +105,7 @@ def glass(
     return Material(name, (lobe,))
 
 
-def refraction(
-    color: Rgb = WHITE, roughness: float = 0.0, ior: float = 1.45, *, name: str = "Refraction"
-) -> Material:
+def refraction(color: Rgb = WHITE, roughness: float = 0.0, ior: float = 1.45, *, name: str = "Refraction") -> Material:
     """Refraction without reflection; what would be reflected totally is lost (Refraction BSDF)."""
     return Material(
         name, (Lobe(LobeKind.REFRACTION, roughness=_unit(roughness), ior=max(ior, 1e-5), f82=_floor(color)),)

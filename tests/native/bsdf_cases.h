@@ -118,10 +118,10 @@ inline std::vector<View> views() {
         for (float cosine : {0.95f, 0.3f, 0.01f, -0.02f, -0.6f}) {
             for (float azimuth : {0.7f, 3.0f}) {
                 if (tilt == 0 && azimuth > 1) continue;
-                result.push_back({frame.normal, tilt == 0 ? frame.normal : shading, direction_at(frame, cosine, azimuth),
-                                  "tilt " + std::to_string(tilt).substr(0, 4) + ", cosine " +
-                                      std::to_string(cosine).substr(0, 5) + ", azimuth " +
-                                      std::to_string(azimuth).substr(0, 3)});
+                result.push_back(
+                    {frame.normal, tilt == 0 ? frame.normal : shading, direction_at(frame, cosine, azimuth),
+                     "tilt " + std::to_string(tilt).substr(0, 4) + ", cosine " + std::to_string(cosine).substr(0, 5) +
+                         ", azimuth " + std::to_string(azimuth).substr(0, 3)});
             }
         }
     }

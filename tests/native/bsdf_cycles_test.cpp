@@ -60,8 +60,8 @@ TEST(BsdfCycles, AlbedosMatch) {
             const Rgb total = view.near_side + view.far_side;
             const auto check = [&](const char* side, float a, float b, float scale) {
                 const double error = std::fabs(a - b) / max_of(scale, 0.02f);
-                EXPECT_LT(error, 0.01) << c.name << ", cosine " << view.cosine << ", " << side << ": " << a << ", Cycles "
-                                       << b << ", measured with " << k_measured_with;
+                EXPECT_LT(error, 0.01) << c.name << ", cosine " << view.cosine << ", " << side << ": " << a
+                                       << ", Cycles " << b << ", measured with " << k_measured_with;
                 double& of = of_kind[c.name.substr(0, c.name.find_first_of("0123456789") - 1)];
                 of = max_of(of, error);
                 worst = max_of(worst, error);

@@ -88,9 +88,7 @@ TEST(BsdfSampling, TheTestFindsWhatIsWrong) {
         return w.x > 0.9f ? Vec3{-w.x, w.y, w.z} : w;
     };
     EXPECT_LT(chi_squared(no_corner, right, {}, k_draws).p, 1e-6);
-    const auto refusing = [&]() -> std::optional<Vec3> {
-        return uniform(random) < 0.005f ? std::nullopt : cosine();
-    };
+    const auto refusing = [&]() -> std::optional<Vec3> { return uniform(random) < 0.005f ? std::nullopt : cosine(); };
     EXPECT_LT(chi_squared(refusing, right, {}, k_draws).p, 1e-6);
 }
 

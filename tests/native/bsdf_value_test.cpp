@@ -64,17 +64,20 @@ TEST(BsdfValue, ReciprocalLobesAreReciprocal) {
                 if (!(s.pdf_solid_angle > 0) || s.specular) continue;
                 const Vec3 a = view.from, b = s.direction;
                 const auto value = [&](Vec3 eye, Vec3 light) {
-                    return eval(bsdf, eye, light) * (abs_dot(light, bsdf.geometric_normal) / abs_dot(light, bsdf.normal));
+                    return eval(bsdf, eye, light) *
+                           (abs_dot(light, bsdf.geometric_normal) / abs_dot(light, bsdf.normal));
                 };
-                const auto index = [&](Vec3 w) { return dot(w, bsdf.geometric_normal) < 0 ? built.lobes[0].eta : 1.0f; };
+                const auto index = [&](Vec3 w) {
+                    return dot(w, bsdf.geometric_normal) < 0 ? built.lobes[0].eta : 1.0f;
+                };
                 // Lambertian lobes are dark only where the light is below the shading normal.
                 const bool frames_agree = dot(a, bsdf.normal) * dot(a, bsdf.geometric_normal) > 0 &&
                                           dot(b, bsdf.normal) * dot(b, bsdf.geometric_normal) > 0;
                 if (!frames_agree) continue;
                 SCOPED_TRACE(c.name + ", " + view.name);
                 // Materials that mix Lambertian and refracting lobes transmit by the latter alone.
-                const bool radiance = built.lobes[0].kind == LobeKind::dielectric ||
-                                      built.lobes[0].kind == LobeKind::refraction;
+                const bool radiance =
+                    built.lobes[0].kind == LobeKind::dielectric || built.lobes[0].kind == LobeKind::refraction;
                 const float eta_a = radiance ? index(a) : 1, eta_b = radiance ? index(b) : 1;
                 EXPECT_TRUE(close(value(a, b) / square(eta_a), value(b, a) / square(eta_b), 2e-3f));
                 ++compared;
@@ -118,7 +121,8 @@ TEST(BsdfValue, NoMaterialGainsEnergy) {
             for (LobeInput& lobe : c.input) lobe.weight = lobe.weight * (1.0f / static_cast<float>(c.input.size()));
         }
         if (c.name == "tinted glass" || c.name == "glass, diffuse and gold") {
-            for (LobeInput& lobe : c.input) lobe.f0 = {min_of(lobe.f0.r, 1.0f), min_of(lobe.f0.g, 1.0f), min_of(lobe.f0.b, 1.0f)};
+            for (LobeInput& lobe : c.input)
+                lobe.f0 = {min_of(lobe.f0.r, 1.0f), min_of(lobe.f0.g, 1.0f), min_of(lobe.f0.b, 1.0f)};
         }
         const BuiltCase built(c.input);
         for (const View& view : views()) {
@@ -148,7 +152,6 @@ TEST(BsdfValue, CompensationFillsTheFurnace) {
     }
 }
 
-// A white plastic loses and gains nothing but what the layering leaves out: the base sees the layer only from the eye.
 TEST(BsdfValue, DiffuseFurnaceIsTheAlbedo) {
     LobeInput input = lobe_input(LobeKind::diffuse);
     input.weight = {0.7f, 0.2f, 0.4f};
@@ -205,19 +208,21 @@ TEST(BsdfValue, SpecularWeightsFollowFromNarrowLobes) {
                 for (int i = 0; i < 20; ++i) {
                     const float u_lobe = uniform(random);
                     const Vec2 u{uniform(random), 0.9f * uniform(random)};
-                    const BsdfSample s = sample(a, view.from, walk, u_lobe, u), n = sample(b, view.from, walk, u_lobe, u);
+                    const BsdfSample s = sample(a, view.from, walk, u_lobe, u),
+                                     n = sample(b, view.from, walk, u_lobe, u);
                     SCOPED_TRACE("kind " + std::to_string(static_cast<int>(input.kind)) + ", " + view.name +
                                  (walk == Walk::eye ? ", eye" : ", light"));
                     if (!s.valid() || !n.valid()) continue;
                     const float g = dot(view.from, view.geometric_normal);
                     if (std::fabs(dot(s.direction, view.geometric_normal)) < 0.05f) continue;
                     ASSERT_TRUE(s.specular);
-                    if (dot(s.direction, view.geometric_normal) * g * dot(n.direction, view.geometric_normal) * g < 0) continue;
+                    if (dot(s.direction, view.geometric_normal) * g * dot(n.direction, view.geometric_normal) * g < 0)
+                        continue;
                     EXPECT_LT(length(s.direction - n.direction), 0.02f);
                     EXPECT_TRUE(close(s.weight, n.weight, 0.02f));
                     // Both densities belong to one pair of directions, so their ratio has a limit too.
-                    EXPECT_TRUE(close(s.pdf_rev_solid_angle / s.pdf_solid_angle, n.pdf_rev_solid_angle / n.pdf_solid_angle,
-                                      0.02f));
+                    EXPECT_TRUE(close(s.pdf_rev_solid_angle / s.pdf_solid_angle,
+                                      n.pdf_rev_solid_angle / n.pdf_solid_angle, 0.02f));
                     EXPECT_TRUE(is_black(eval(a, view.from, s.direction)));
                     EXPECT_EQ(pdf(a, view.from, s.direction), 0);
                     ++compared;
@@ -262,6 +267,16 @@ TEST(BsdfValue, SmoothInterfacesObeySnellAndFresnel) {
     EXPECT_EQ(total.pdf_rev_solid_angle, 1);
 }
 
+TEST(BsdfValue, UnitCircleIsCosineAndSine) {
+    for (int i = 0; i < 1000; ++i) {
+        const float u = static_cast<float>(i) / 1000;
+        const Vec2 p = unit_circle(u);
+        const double angle = 2 * 3.14159265358979323846 * static_cast<double>(u);
+        EXPECT_NEAR(p.x, std::cos(angle), 3e-7);
+        EXPECT_NEAR(p.y, std::sin(angle), 3e-7);
+    }
+}
+
 // Schlick's term meets its three anchors; the conductor's meets published reflectances of gold and the dielectric's.
 TEST(BsdfValue, FresnelTermsMeetTheirAnchors) {
     const Rgb f0{0.9f, 0.6f, 0.3f}, tint{0.7f, 1.0f, 0.4f};
@@ -269,11 +284,13 @@ TEST(BsdfValue, FresnelTermsMeetTheirAnchors) {
     EXPECT_TRUE(close(fresnel_schlick(0, f0, tint), rgb(1), 1e-6f));
     const float rise = std::pow(6.0f / 7, 5.0f);
     EXPECT_TRUE(close(fresnel_schlick(1.0f / 7, f0, tint), (f0 + (rgb(1) - f0) * rise) * tint, 1e-5f));
-    EXPECT_NEAR(fresnel_conductor(1, 0.27f, 2.78f), (square(0.73f) + square(2.78f)) / (square(1.27f) + square(2.78f)), 1e-6);
+    EXPECT_NEAR(fresnel_conductor(1, 0.27f, 2.78f), (square(0.73f) + square(2.78f)) / (square(1.27f) + square(2.78f)),
+                1e-6);
     EXPECT_NEAR(fresnel_conductor(0, 0.27f, 2.78f), 1, 1e-6);
     for (const float cosine : {0.05f, 0.3f, 0.7f, 1.0f}) {
         EXPECT_NEAR(fresnel_conductor(cosine, 1.5f, 0), fresnel_dielectric(cosine, 1.5f), 1e-5);
-        EXPECT_TRUE(close(fresnel_tinted_dielectric(cosine, 1.5f, rgb(1)), rgb(fresnel_dielectric(cosine, 1.5f)), 1e-5f));
+        EXPECT_TRUE(
+            close(fresnel_tinted_dielectric(cosine, 1.5f, rgb(1)), rgb(fresnel_dielectric(cosine, 1.5f)), 1e-5f));
     }
     EXPECT_NEAR(fresnel_dielectric(1, 1.5f), 0.04f, 1e-6);
     // The means that compensation uses, against quadrature.

@@ -38,8 +38,10 @@ inline ChiSquared compare_counts(const std::vector<double>& observed, const std:
     for (size_t k = 0; k < order.size(); ++k) {
         o += observed[order[k]], e += expected[order[k]];
         if (e < 10 && k + 1 < order.size()) continue;
-        if (e > 0) result.statistic += (o - e) * (o - e) / e;
-        else if (o > 0) result.statistic = INFINITY;
+        if (e > 0)
+            result.statistic += (o - e) * (o - e) / e;
+        else if (o > 0)
+            result.statistic = INFINITY;
         ++result.bins;
         o = e = 0;
     }
@@ -78,8 +80,7 @@ public:
     double integral(size_t k, const std::function<double(Vec3)>& density, int least_depth) const {
         const int i = static_cast<int>(k) / bins_.azimuthal, j = static_cast<int>(k) % bins_.azimuthal;
         const double du = 1.0 / bins_.polar, dv = 1.0 / bins_.azimuthal;
-        return refine(density, i * du, j * dv, du, dv, gauss(density, i * du, j * dv, du, dv),
-                      least_depth);
+        return refine(density, i * du, j * dv, du, dv, gauss(density, i * du, j * dv, du, dv), least_depth);
     }
 
 private:
@@ -98,7 +99,8 @@ private:
 
     // Three points of Gauss-Legendre in each direction.
     double gauss(const std::function<double(Vec3)>& density, double u, double v, double du, double dv) const {
-        static constexpr double x[3] = {0.1127016653792583, 0.5, 0.8872983346207417}, w[3] = {5.0 / 18, 4.0 / 9, 5.0 / 18};
+        static constexpr double x[3] = {0.1127016653792583, 0.5, 0.8872983346207417},
+                                w[3] = {5.0 / 18, 4.0 / 9, 5.0 / 18};
         double sum = 0;
         for (int i = 0; i < 3; ++i) {
             for (int j = 0; j < 3; ++j) sum += w[i] * w[j] * at(density, u + x[i] * du, v + x[j] * dv);

@@ -10,7 +10,6 @@ parameters, so that the whole way from a node's inputs to the BSDF is compared.
 from __future__ import annotations
 
 import itertools
-import os
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -23,11 +22,11 @@ import bpy
 import numpy as np
 
 from vlp_bpt import materials
-from vlp_bpt.scene import Material
+from vlp_bpt.scene import Lobe, LobeKind, Material
 
 FRONT = (0.95, 0.6, 0.25)
 BOTH = (0.9, 0.4, -0.4, -0.9)
-PIXELS, SAMPLES = 16, 2048
+PIXELS, SAMPLES = 16, 1024
 
 
 @dataclass
@@ -40,6 +39,12 @@ class Case:
     material: Material
     cosines: tuple[float, ...] = FRONT
     distribution: str | None = None
+
+    @property
+    def transmits(self) -> bool:
+        """Whether light reaches the eye from the far side."""
+        opaque = (LobeKind.DIFFUSE, LobeKind.REFLECTION)
+        return any(lobe.kind not in opaque for lobe in self.material.lobes)
 
 
 def cases() -> Iterator[Case]:
@@ -99,7 +104,10 @@ def cases() -> Iterator[Case]:
     tint = (1.0, 0.5, 0.2)
     sweeps += [{"specular_tint": tint, **other} for other in ({}, {"metallic": 1.0}, {"transmission": 1.0})]
     sweeps += [{"metallic": 0.3, "transmission": 0.4, "roughness": 0.4, "specular_tint": tint, "alpha": 0.7}]
-    sweeps += [{"roughness": 0.4, "distribution": "GGX"}, {"roughness": 0.9, "transmission": 1.0, "distribution": "GGX"}]
+    sweeps += [
+        {"roughness": 0.4, "distribution": "GGX"},
+        {"roughness": 0.9, "transmission": 1.0, "distribution": "GGX"},
+    ]
     for sweep in sweeps:
         parameters = {"base_color": red, **sweep}
         sockets = {
@@ -132,7 +140,8 @@ def prepare() -> None:
     scene.render.resolution_x = scene.render.resolution_y = PIXELS
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"
-    bpy.ops.mesh.primitive_plane_add(size=1000.0)
+    # Off the middle: rays that cross the diagonal, where the plane's two triangles meet, hit the other one again.
+    bpy.ops.mesh.primitive_plane_add(size=1000.0, location=(300.0, -100.0, 0.0))
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 0.01
     scene.collection.objects.link(camera)
@@ -188,7 +197,7 @@ def measure(cosine: float, above: bool) -> np.ndarray:
     scene.camera.location = (5 * sin(angle) * cos(0.4), 5 * sin(angle) * sin(0.4), 5 * cos(angle))
     scene.camera.rotation_euler = (angle, 0.0, 0.4 + pi / 2)
     with tempfile.TemporaryDirectory() as folder:
-        scene.render.filepath = os.path.join(folder, "x.exr")
+        scene.render.filepath = str(Path(folder) / "x.exr")
         bpy.ops.render.render(write_still=True)
         image = bpy.data.images.load(scene.render.filepath)
         pixels = np.array(image.pixels[:]).reshape(-1, image.channels)[:, :3]
@@ -196,24 +205,34 @@ def measure(cosine: float, above: bool) -> np.ndarray:
     return pixels.mean(axis=0)
 
 
+def number(value: float) -> str:
+    text = f"{value:.7g}"
+    return text + ("f" if "." in text or "e" in text else ".0f")
+
+
 def color(values: Any) -> str:
-    return "{" + ", ".join(f"{float(v):.7g}f" for v in values) + "}"
+    return "{" + ", ".join(number(float(value)) for value in values) + "}"
+
+
+def initialiser(lobe: Lobe) -> str:
+    """A lobe as `LobeInput`."""
+    return (
+        f"{{LobeKind({lobe.kind.value}), Fresnel({lobe.fresnel.value}), {color(lobe.weight)}, "
+        f"{number(lobe.roughness)}, {number(lobe.ior)}, {color(lobe.f0)}, {color(lobe.f82)}, {lobe.layered_under}, "
+        f"{'true' if lobe.compensate else 'false'}}}"
+    )
 
 
 def rows(case: Case) -> Iterator[str]:
     """The case as an initialiser of `CyclesCase`."""
     yield f'    {{"{case.name}",\n     {{'
     for lobe in case.material.lobes:
-        yield (
-            f"         {{LobeKind({lobe.kind.value}), Fresnel({lobe.fresnel.value}), {color(lobe.weight)}, "
-            f"{lobe.roughness:.7g}f, {lobe.ior:.7g}f, {color(lobe.f0)}, {color(lobe.f82)}, {lobe.layered_under}, "
-            f"{'true' if lobe.compensate else 'false'}}},"
-        )
+        yield f"         {initialiser(lobe)},"
     yield "     },\n     {"
     for cosine in case.cosines:
         near = measure(cosine, cosine > 0)
-        far = measure(cosine, cosine < 0)
-        yield f"         {{{cosine}f, {color(near)}, {color(far)}}},"
+        far = measure(cosine, cosine < 0) if case.transmits else np.zeros(3)
+        yield f"         {{{number(cosine)}, {color(near)}, {color(far)}}},"
     yield "     }},"
 
 
