@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -17,8 +18,8 @@ from .notes import ExportError, Notes
 from .pointcloud import export_pointcloud
 from .world import export_world
 
-# Shown through the mesh that they evaluate to, which the depsgraph lists beside them.
-CONVERTED_TYPES = {"CURVE", "SURFACE", "FONT", "META"}
+# Curves, surfaces, text and metaballs are shown through the mesh that they evaluate to, which is listed beside them.
+GEOMETRY_TYPES = {"MESH", "POINTCLOUD"}
 MISSING_TYPES = {"CURVES": "hair curves", "VOLUME": "volumes", "GREASEPENCIL": "grease pencil"}
 OTHER_VISIBILITY = ("visible_diffuse", "visible_glossy", "visible_transmission", "visible_shadow")
 
@@ -50,15 +51,25 @@ def export_scene(
     return exported
 
 
+@dataclass(frozen=True)
+class _Shown:
+    """What all instances of one object with one geometry share."""
+
+    name: str
+    geometry: int  # index in the scene
+    materials: tuple[int, ...]
+    visibility: Visibility
+
+
 class _Objects:
     """Adds the objects of a depsgraph to a scene, and remembers what was added for the instances to come."""
 
     def __init__(self, scene: Scene, notes: Notes) -> None:
         self.scene = scene
         self.notes = notes
-        self._geometries: dict[tuple[str, int], int] = {}  # type and pointer of evaluated data; -1: nothing to render
-        self._materials: dict[int, int] = {}  # pointer of an evaluated material (0: none)
-        self._slots: dict[tuple[int, int], tuple[int, ...]] = {}  # pointers of the original object and its data
+        self._geometries: dict[tuple[str, int], int | None] = {}  # by type and pointer of evaluated data; None: empty
+        self._materials: dict[int, int] = {}  # by pointer of an evaluated material, 0 for none
+        self._shown: dict[tuple[int, int], _Shown | None] = {}  # by pointers of the original object and its data
 
     def add_all(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Adds every object and instance. None of them is kept: they die as the iteration goes on."""
@@ -68,54 +79,62 @@ class _Objects:
             if not instance.show_self:
                 continue
             shown = instance.object
-            if shown.type == "LIGHT":
-                self._add_light(shown, transforms[index], _visibility(instance))
-            elif shown.type in ("MESH", "POINTCLOUD"):
-                self._add_geometry(instance, shown, transforms[index], bool(singular[index]))
+            hidden = instance.is_instance and not instance.parent.visible_camera
+            if shown.type in GEOMETRY_TYPES:
+                self._add_geometry(shown, transforms[index], bool(singular[index]), hidden)
+            elif shown.type == "LIGHT":
+                self._add_light(shown, transforms[index], hidden)
             elif shown.type in MISSING_TYPES:
                 self.notes.warn(f"Object '{shown.name}': {MISSING_TYPES[shown.type]} are not there yet, left out")
 
-    def _add_light(self, lamp: Any, matrix: Float32, visibility: Visibility) -> None:
+    def _add_light(self, lamp: Any, matrix: Float32, hidden: bool) -> None:
+        visibility = Visibility(0) if hidden else _visibility(lamp)
         light = export_light(lamp, matrix, visibility, self.notes)
         if light is not None:
             self.scene.lights.append(light)
 
-    def _add_geometry(self, instance: Any, shown: Any, matrix: Float32, singular: bool) -> None:
-        geometry = self._geometry(shown)
-        if geometry < 0:
+    def _add_geometry(self, shown: Any, matrix: Float32, singular: bool, hidden: bool) -> None:
+        # Objects that Blender makes for instances of geometry nodes share a pointer in turn: their original does not.
+        key = (shown.original.as_pointer(), shown.data.as_pointer())
+        if key not in self._shown:
+            self._shown[key] = self._describe(shown)
+        common = self._shown[key]
+        if common is None:
             return
         if singular:
-            scale = tuple(round(float(x), 6) for x in np.linalg.norm(matrix[:, :3], axis=0))
-            self.notes.warn(f"Object '{shown.name}': its scale {scale} flattens it to nothing, left out")
+            scale = tuple(round(float(length), 6) for length in np.linalg.norm(matrix[:, :3], axis=0))
+            self.notes.warn(f"Object '{common.name}': its scale {scale} flattens it to nothing, left out")
             return
+        visibility = Visibility(0) if hidden else common.visibility
+        self.scene.instances.append(Instance(common.name, common.geometry, matrix, common.materials, visibility))
+
+    def _describe(self, shown: Any) -> _Shown | None:
+        geometry = self._geometry(shown)
+        if geometry is None:
+            return None
         if not all(getattr(shown, name) for name in OTHER_VISIBILITY):
             self.notes.warn(f"Object '{shown.name}': ray visibility other than to the camera is not there yet")
         if shown.is_holdout:
             self.notes.warn(f"Object '{shown.name}': holdouts are not there yet")
-        self.scene.instances.append(
-            Instance(shown.name, geometry, matrix, self._material_slots(shown), _visibility(instance))
-        )
+        return _Shown(shown.name, geometry, self._material_slots(shown), _visibility(shown))
 
-    def _geometry(self, shown: Any) -> int:
-        """The index of an object's geometry in the scene, exported at the first sight of it; -1: it is empty."""
+    def _geometry(self, shown: Any) -> int | None:
+        """The index of an object's geometry in the scene, exported at the first sight of it."""
         key = (shown.type, shown.data.as_pointer())
         if key not in self._geometries:
             geometry = _exported(shown)
-            self._geometries[key] = -1 if geometry is None else len(self.scene.geometries)
+            self._geometries[key] = None if geometry is None else len(self.scene.geometries)
             if geometry is not None:
                 self.scene.geometries.append(geometry)
         return self._geometries[key]
 
     def _material_slots(self, shown: Any) -> tuple[int, ...]:
         """A scene material for each slot: linked to the object or to its data, at least one."""
-        key = (shown.original.as_pointer(), shown.data.as_pointer())
-        if key not in self._slots:
-            materials = list(shown.data.materials)
-            for index, slot in enumerate(shown.material_slots):
-                if slot.link == "OBJECT" or index >= len(materials):
-                    materials[index : index + 1] = [slot.material]
-            self._slots[key] = tuple(self._material(material) for material in materials or [None])
-        return self._slots[key]
+        materials = list(shown.data.materials)
+        for index, slot in enumerate(shown.material_slots):
+            if slot.link == "OBJECT" or index >= len(materials):
+                materials[index : index + 1] = [slot.material]
+        return tuple(self._material(material) for material in materials or [None])
 
     def _material(self, material: Any) -> int:
         key = 0 if material is None else material.as_pointer()
@@ -137,9 +156,8 @@ def _exported(shown: Any) -> Mesh | Spheres | None:
         shown.to_mesh_clear()
 
 
-def _visibility(instance: Any) -> Visibility:
-    visible = instance.object.visible_camera and (not instance.is_instance or instance.parent.visible_camera)
-    return Visibility.CAMERA if visible else Visibility(0)
+def _visibility(shown: Any) -> Visibility:
+    return Visibility.CAMERA if shown.visible_camera else Visibility(0)
 
 
 def instance_transforms(depsgraph: bpy.types.Depsgraph) -> Float32:

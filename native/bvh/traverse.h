@@ -25,6 +25,19 @@ VLP_HD inline float intersect_lane(const TraversalRay& ray, const SphereBlock& b
     return roots.found ? first_root(roots, t_max, from, to) : k_infinity;
 }
 
+// Asks for the memory of a child that will soon be visited, while others are still in work.
+VLP_HD VLP_FORCE_INLINE void prefetch([[maybe_unused]] const BvhView& bvh, [[maybe_unused]] uint32_t child) {
+#if !VLP_ON_DEVICE
+    const uint32_t index = child_index(child);
+    const char* const first = child_kind(child) == ChildKind::node
+                                  ? reinterpret_cast<const char*>(bvh.nodes + index)
+                                  : reinterpret_cast<const char*>(bvh.triangle_blocks + index);
+    __builtin_prefetch(first);
+    __builtin_prefetch(first + 64);
+    __builtin_prefetch(first + 128);
+#endif
+}
+
 // A child that waits on the stack, and where the ray enters it, in one number that sorts by the entry: entries are not
 // negative, so that their bits sort as they do.
 VLP_HD inline uint64_t make_waiting(float t, uint32_t child) {
@@ -33,11 +46,12 @@ VLP_HD inline uint64_t make_waiting(float t, uint32_t child) {
 VLP_HD inline float entry_of(uint64_t waiting) { return float_of(static_cast<int32_t>(waiting >> 32)); }
 
 // Puts the children of `mask` (two or more) on the stack, farthest first, but for the nearest, which is returned.
-VLP_HD VLP_FORCE_INLINE uint32_t push_sorted(const BvhNode& node, uint32_t mask, const float* entry, uint64_t* stack,
+VLP_HD VLP_FORCE_INLINE uint32_t push_sorted(const BvhView& bvh, const BvhNode& node, uint32_t mask, const float* entry, uint64_t* stack,
                                              uint32_t& top) {
     const auto take = [&] {
         const uint32_t i = lowest_bit(mask);
         mask &= mask - 1;
+        prefetch(bvh, node.child[i]);
         return make_waiting(entry[i], node.child[i]);
     };
     uint64_t nearest = take();
@@ -75,7 +89,7 @@ VLP_HD inline void closest_in_tree(const SceneView& scene, const Ray& world_ray,
                 at_leaf = false;
                 break;
             }
-            child = (mask & (mask - 1)) == 0 ? node.child[lowest_bit(mask)] : push_sorted(node, mask, entry, stack, top);
+            child = (mask & (mask - 1)) == 0 ? node.child[lowest_bit(mask)] : push_sorted(bvh, node, mask, entry, stack, top);
         }
         if (at_leaf) {
             const uint32_t index = child_index(child), end = index + child_blocks(child);
@@ -131,7 +145,11 @@ VLP_HD inline bool any_in_tree(const SceneView& scene, const Ray& world_ray, con
                 break;
             }
             child = node.child[lowest_bit(mask)];
-            for (mask &= mask - 1; mask != 0; mask &= mask - 1) stack[top++] = node.child[lowest_bit(mask)];
+            prefetch(bvh, child);
+            for (mask &= mask - 1; mask != 0; mask &= mask - 1) {
+                prefetch(bvh, node.child[lowest_bit(mask)]);
+                stack[top++] = node.child[lowest_bit(mask)];
+            }
         }
         if (at_leaf) {
             const uint32_t index = child_index(child), end = index + child_blocks(child);

@@ -17,8 +17,8 @@ struct CameraParameters {
     uint32_t width = 1, height = 1;
 };
 
-// Scale is taken out of the transform, as Cycles does. Nothing if the transform is singular, the view or the film is empty,
-// or a number isn't finite (clip_end may be infinite).
+// Scale is taken out of the transform, as Cycles does. Nothing if the transform is singular, the view or the film is
+// empty, or a number isn't finite (clip_end may be infinite).
 std::optional<Camera> make_camera(const CameraParameters& parameters);
 
 }  // namespace vlp

@@ -1,4 +1,4 @@
-// Orthographic cameras: all rays that pass the same point of the lens are parallel, and each pixel has a lens of its own.
+// Orthographic cameras: rays through the same lens point are parallel, and each pixel has a lens of its own.
 #pragma once
 
 #include "camera/film_plane.h"

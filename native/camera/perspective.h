@@ -18,7 +18,8 @@ VLP_HD inline Vec2 perspective_film(const Camera& camera, Vec2 lens, Vec3 point)
     return plane_to_film(camera, camera.aperture_radius > 0 ? pinhole + lens * (1 / camera.focus_distance) : pinhole);
 }
 
-// Pixels a steradian: the plane of focus F away shows pixel_area F² of itself to a pixel, at distance F / cosine, tilted.
+// Pixels a steradian: the plane of focus F away shows pixel_area F² of itself to a pixel, at distance F / cosine,
+// tilted.
 VLP_HD inline float perspective_pixels_per_steradian(const Camera& camera, float cosine) {
     return 1 / (pixel_area(camera) * cosine * cosine * cosine);
 }

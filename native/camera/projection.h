@@ -1,9 +1,9 @@
 // Camera rays from points on film and lens, and the way back from a point of the scene to the film.
 //
-// One number joins the two: `pixels_per_area`, the film area (pixels²) whose rays from one lens point pass through a square
-// metre at the scene point that faces them. An eye path through a film density h (per pixel², the filter's) reaches a
-// surface with density h pixels_per_area |cos| per m². A light path's vertex with throughput beta and scattering f adds
-// beta f |cos| pixels_per_area h to the pixel: the camera's importance and the geometry term in one.
+// One number joins the two: `pixels_per_area`, the film area (pixels²) whose rays from one lens point pass through a
+// square metre at the scene point that faces them. An eye path through a film density h (per pixel², the filter's)
+// reaches a surface with density h pixels_per_area |cos| per m². A light path's vertex with throughput beta and
+// scattering f adds beta f |cos| pixels_per_area h to the pixel: the camera's importance and the geometry term in one.
 #pragma once
 
 #include "camera/orthographic.h"

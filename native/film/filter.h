@@ -1,8 +1,8 @@
 // Pixel filters, sampled in proportion to themselves so that every camera sample has weight 1.
 //
 // `width` is Blender's filter width and the shapes are Cycles': a box of that side; a Gaussian of standard deviation
-// width / 4; a Blackman-Harris window that ends at `width` from the pixel's centre. Box widths other than 1 px are our own:
-// Cycles always takes 1.
+// width / 4; a Blackman-Harris window that ends at `width` from the pixel's centre. Box widths other than 1 px are our
+// own: Cycles always takes 1.
 #pragma once
 
 #include "core/warp.h"
@@ -39,8 +39,8 @@ VLP_HD inline WindowValue blackman_harris(float x) {
             x - (k_1 * s - 0.5f * k_2 * s2 + k_3 / 3 * s3) * (0.5f * k_inv_pi)};
 }
 
-// The x whose cumulative is u: a polynomial in the fourth root of u that is good to 4e-4 in u, then one step of Newton's
-// method, which leaves 5e-7.
+// The x whose cumulative is u: a polynomial in the fourth root of u that is good to 4e-4 in u, then one step of
+// Newton's method, which leaves 5e-7.
 VLP_HD inline float blackman_harris_inverse(float u) {
     const float p = 0.5f - std::fabs(u - 0.5f);  // the window is symmetric
     const float v = std::sqrt(std::sqrt(p));

@@ -1,7 +1,7 @@
 // Area lamps: one-sided rectangles and ellipses, Lambertian or narrowed by a spread.
 //
-// Spread s < pi multiplies the radiance by 1 - tan(angle) / tan(s / 2), what a grid of slats in front of the lamp would let
-// through. light.spread holds cot(s / 2), 0 for a Lambertian lamp, so that one formula serves both;
+// Spread s < pi multiplies the radiance by 1 - tan(angle) / tan(s / 2), what a grid of slats in front of the lamp would
+// let through. light.spread holds cot(s / 2), 0 for a Lambertian lamp, so that one formula serves both;
 // light.spread_share is the share of a Lambertian lamp's power that is left.
 #pragma once
 

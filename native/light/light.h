@@ -33,8 +33,8 @@ VLP_HD inline Vec3 emission_normal(const Light& light, Vec3 position, Vec3 direc
     return face_toward(n, direction);
 }
 
-// Radiance that leaves the point `position` with emission normal `normal` in `direction` (unit, away from the light, for
-// infinite lights the way that light travels). Points without an extent: intensity; delta suns: irradiance.
+// Radiance that leaves the point `position` with emission normal `normal` in `direction` (unit, away from the light,
+// for infinite lights the way that light travels). Points without an extent: intensity; delta suns: irradiance.
 VLP_HD inline Rgb emitted(const SceneView&, const Light& light, Vec3 /*position*/, Vec3 normal, Vec3 direction) {
     switch (light.kind) {
         case LightKind::point:
@@ -73,8 +73,8 @@ VLP_HD inline Emission sample_emission(const SceneView& scene, const Light& ligh
     return {};
 }
 
-// The densities of the ray from `position` in `direction`, their product being that of `sample_emission`. 0 where no light
-// path starts: the inner side of a lamp's sphere, directions that the lamp does not shine in.
+// The densities of the ray from `position` in `direction`, their product being that of `sample_emission`. 0 where no
+// light path starts: the inner side of a lamp's sphere, directions that the lamp does not shine in.
 VLP_HD inline EmissionPdf pdf_emission(const SceneView& scene, const Light& light, Vec3 position, Vec3 normal,
                                        Vec3 direction) {
     switch (light.kind) {
@@ -129,7 +129,7 @@ VLP_HD inline float pdf_next_event(const SceneView&, const Light& light, Vec3 re
     switch (light.kind) {
         case LightKind::point:
         case LightKind::spot:
-            return point_pdf_next_event(light, receiver, position, normal, direction);
+            return point_pdf_next_event(light, receiver, position, normal);
         case LightKind::sun:
             return light.radius == 0 ? 0 : sun_pdf_direction(light, -direction);
         case LightKind::area:
@@ -137,7 +137,7 @@ VLP_HD inline float pdf_next_event(const SceneView&, const Light& light, Vec3 re
         case LightKind::triangle:
             return triangle_pdf_next_event(light, receiver, position, direction);
         case LightKind::sphere:
-            return pdf_sphere_shape(light.position, light.radius, receiver, position, normal, direction);
+            return pdf_sphere_shape(light.position, light.radius, receiver, position, normal);
         case LightKind::environment:
             return pdf_cone(2.0f);
     }
@@ -160,8 +160,8 @@ VLP_HD inline void for_each_lamp_hit(const SceneView& scene, const Ray& ray, F&&
     }
 }
 
-// Calls f(light_index) for every infinite light that an escaping ray in `direction` sees: the environment and the suns in
-// whose disc it ends. What it sees of one is emitted(..., -direction).
+// Calls f(light_index) for every infinite light that an escaping ray in `direction` sees: the environment and the suns
+// in whose disc it ends. What it sees of one is emitted(..., -direction).
 template <typename F>
 VLP_HD inline void for_each_infinite_light(const SceneView& scene, Vec3 direction, F&& f) {
     for (uint32_t i = 0; i < scene.infinite_light_count; ++i) {

@@ -2,6 +2,7 @@
 #include "light/light_build.h"
 
 #include <algorithm>
+#include <limits>
 #include <numbers>
 
 namespace vlp {
@@ -137,7 +138,8 @@ Light make_environment(Rgb radiance) {
 }
 
 float power(const Light& light, float scene_radius) {
-    const double mean = (double{light.radiance.r} + light.radiance.g + light.radiance.b) / 3;
+    const auto size = [](float x) { return std::fabs(double{x}); };  // Blender's lamps may take light away
+    const double mean = (size(light.radiance.r) + size(light.radiance.g) + size(light.radiance.b)) / 3;
     const double disc = k_pi_d * scene_radius * scene_radius;
     double watts = 0;
     switch (light.kind) {
@@ -145,8 +147,8 @@ float power(const Light& light, float scene_radius) {
             watts = mean * (light.radius > 0 ? k_pi_d * light.area : 4 * k_pi_d);
             break;
         case LightKind::spot: {
-            // Smoothstep is one half on average, over the blended share of the cone; the map to the lamp's space is left
-            // out, which only a strongly stretched lamp would notice.
+            // Smoothstep is one half on average, over the blended share of the cone; the map to the lamp's space is
+            // left out, which only a strongly stretched lamp would notice.
             const double cone = 2 * k_pi_d * (1 - light.cos_outer) * (1 - 0.5 * light.blend);
             watts = mean * cone * (light.radius > 0 ? k_pi_d * light.radius * light.radius : 1);
             break;
@@ -167,20 +169,21 @@ float power(const Light& light, float scene_radius) {
             watts = mean * 4 * k_pi_d * disc;
             break;
     }
-    return static_cast<float>(watts);
+    return static_cast<float>(std::min(watts, double{std::numeric_limits<float>::max()}));
 }
 
 std::vector<uint32_t> make_distribution(std::span<const double> weights) {
+    const auto part = [](double w) { return w > 0 ? std::min(w, 1e290) : 0; };
     double total = 0;
-    for (const double w : weights) total += w;
+    for (const double w : weights) total += part(w);
     // Entry i starts after one number for each entry before it and their share of the numbers that are left.
-    const double left = 4294967296.0 - static_cast<double>(weights.size());
+    const double count = static_cast<double>(weights.size()), left = 4294967296.0 - count;
     std::vector<uint32_t> below(weights.size());
     double sum = 0;
     for (size_t i = 0; i < weights.size(); ++i) {
-        const double share = total > 0 ? sum / total : static_cast<double>(i) / static_cast<double>(weights.size());
-        below[i] = static_cast<uint32_t>(std::min(std::floor(share * left), left)) + static_cast<uint32_t>(i);
-        sum += weights[i];
+        const double share = total > 0 ? sum / total : static_cast<double>(i) / count;
+        below[i] = static_cast<uint32_t>(std::min(share, 1.0) * left) + static_cast<uint32_t>(i);
+        sum += part(weights[i]);
     }
     return below;
 }

@@ -9,8 +9,8 @@
 
 namespace vlp {
 
-// Units as in vlp_bpt.scene. Each returns nothing for a light that can't shine because its shape or transform is degenerate
-// (no area, singular, not finite). `visibility` is left to the caller.
+// Units as in vlp_bpt.scene. Each returns nothing for a light that can't shine because its shape or transform is
+// degenerate (no area, singular, not finite). `visibility` is left to the caller.
 std::optional<Light> make_point(Vec3 position, Rgb power, float radius);
 std::optional<Light> make_spot(const Affine& transform, Rgb power, float spot_size, float blend, float radius);
 std::optional<Light> make_sun(const Affine& transform, Rgb irradiance, float angle);
@@ -25,11 +25,11 @@ std::optional<Light> make_sphere(Vec3 center, float radius, Rgb radiance, uint32
 
 Light make_environment(Rgb radiance);
 
-// Watts that leave the light, mean of the channels; for infinite lights what enters the scene's sphere.
+// Watts that leave the light, mean of the channels' sizes; for infinite lights what enters the scene's sphere.
 float power(const Light& light, float scene_radius);
 
 // The array of a Distribution. Each entry gets at least one of the 2^32 numbers, so that none is impossible that may
-// still matter: an entry of weight 0 is drawn once in 2^32. All weights 0: uniform. They must be finite and not negative.
+// still matter: an entry of weight 0 is drawn once in 2^32. What is not positive counts as 0; all 0: uniform.
 std::vector<uint32_t> make_distribution(std::span<const double> weights);
 
 }  // namespace vlp

@@ -30,7 +30,9 @@ struct NextEvent {
     bool delta = false;
     PrimitiveId surface;  // the emitting primitive, none for lamps: a shadow ray must not stop at it
 
-    VLP_HD bool valid() const { return pdf_solid_angle > 0 && is_finite(pdf_solid_angle) && distance > 0; }
+    // A point was drawn; and it sends light.
+    VLP_HD bool drawn() const { return pdf_solid_angle > 0 && is_finite(pdf_solid_angle) && distance > 0; }
+    VLP_HD bool valid() const { return drawn() && !is_black(radiance); }
 };
 
 // A density per area as one per solid angle, at a distance from a surface seen under a cosine; 0 edge on.

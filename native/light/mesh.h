@@ -8,8 +8,8 @@
 namespace vlp {
 
 VLP_HD inline Vec3 triangle_point(const Light& light, Vec2 u) {
-    // Uniform without a square root, folding the unit square along its diagonal's normal (Heitz 2019, "A Low-Distortion Map
-    // Between Triangle and Square").
+    // Uniform without a square root, folding the unit square along its diagonal's normal (Heitz 2019, "A Low-Distortion
+    // Map Between Triangle and Square").
     const Vec2 b = u.x < u.y ? Vec2{0.5f * u.x, u.y - 0.5f * u.x} : Vec2{u.x - 0.5f * u.y, 0.5f * u.y};
     return light.position + light.axis_u * b.x + light.axis_v * b.y;
 }
@@ -58,9 +58,9 @@ VLP_HD inline EmissionPdf surface_pdf_emission(const Light& light, Vec3 position
     return {1 / light.area, share * cosine * k_inv_pi};
 }
 
-// Next event draws by area from a triangle that fills fewer steradians than this, by solid angle from others. Measured: by
-// area, the cosine and the distance alone then vary by a third of their mean at most grazing views, and drawing by angle
-// costs less than a tenth of a shadow ray more.
+// Next event draws by area from a triangle that fills fewer steradians than this, by solid angle from others. Measured:
+// by area, the cosine and the distance alone then vary by a third of their mean at most grazing views, and drawing by
+// angle costs less than a tenth of a shadow ray more.
 inline constexpr float k_min_triangle_angle = 0.02f;
 
 VLP_HD inline SphericalTriangle triangle_seen_from(const Light& light, Vec3 receiver) {
@@ -68,8 +68,10 @@ VLP_HD inline SphericalTriangle triangle_seen_from(const Light& light, Vec3 rece
     return make_spherical_triangle(a, a + light.axis_u, a + light.axis_v, light.normal * (2 * light.area));
 }
 
+// False for a receiver at a corner, where the angle has no meaning.
 VLP_HD inline bool by_solid_angle(const SphericalTriangle& s) {
-    return s.above > 0.5f * k_min_triangle_angle * s.below;  // tan x = x for such angles; false for a receiver at a corner
+    constexpr float k_tangent = 0.5f * k_min_triangle_angle;  // of half the angle, which is small
+    return s.above > k_tangent * s.below;
 }
 
 VLP_HD inline NextEvent triangle_sample_next_event(const Light& light, Vec3 receiver, Vec2 u) {

@@ -1,9 +1,9 @@
 // Point lamps: a sphere of constant radiance, or a point of constant intensity when the radius is 0.
 //
-// A sphere shines outward; a receiver inside it sees the inner side by next event and by hits, as in Cycles, but no light
-// path starts inward (that density is 0, so weights leave the strategy out).
-// Cycles differs when the lamp's Soft Falloff is on, as it is by default: it then draws a disc of the sphere's radius and
-// radiance that faces the receiver, which lights a receiver at distance d by d² / (d² + r²) of what the sphere does.
+// A sphere shines outward; a receiver inside it sees the inner side by next event and by hits, as in Cycles, but no
+// light path starts inward (that density is 0, so weights leave the strategy out). Cycles differs when the lamp's Soft
+// Falloff is on, as it is by default: it then draws a disc of the sphere's radius and radiance that faces the receiver,
+// which lights a receiver at distance d by d² / (d² + r²) of what the sphere does.
 #pragma once
 
 #include "core/frame.h"
@@ -63,10 +63,8 @@ VLP_HD inline NextEvent point_sample_next_event(const Light& light, Vec3 receive
     return e;
 }
 
-VLP_HD inline float point_pdf_next_event(const Light& light, Vec3 receiver, Vec3 position, Vec3 normal,
-                                         Vec3 direction) {
-    if (light.radius == 0) return 0;
-    return pdf_sphere_shape(light.position, light.radius, receiver, position, normal, direction);
+VLP_HD inline float point_pdf_next_event(const Light& light, Vec3 receiver, Vec3 position, Vec3 normal) {
+    return light.radius == 0 ? 0 : pdf_sphere_shape(light.position, light.radius, receiver, position, normal);
 }
 
 }  // namespace vlp

@@ -65,12 +65,12 @@ VLP_HD inline NextEvent sample_sphere_shape(Vec3 center, float radius, Vec3 rece
     return e;
 }
 
-// Density with which the above finds the point `position` whose normal is `normal`: from outside, only the near cap.
-VLP_HD inline float pdf_sphere_shape(Vec3 center, float radius, Vec3 receiver, Vec3 position, Vec3 normal,
-                                     Vec3 direction) {
+// Density with which the above finds the point `position`, whose normal looks toward the receiver: from outside, it
+// finds only points of the near cap, whose normals look outward.
+VLP_HD inline float pdf_sphere_shape(Vec3 center, float radius, Vec3 receiver, Vec3 position, Vec3 normal) {
     const SphereAspect aspect = sphere_aspect(center, radius, receiver);
     const bool outer_side = dot(position - center, normal) > 0;
-    return outer_side != aspect.inside && dot(normal, direction) < 0 ? pdf_solid_angle(aspect) : 0.0f;
+    return outer_side != aspect.inside ? pdf_solid_angle(aspect) : 0.0f;
 }
 
 // First crossing in (0, ray.t_max), the normal looking against the ray; false: none.

@@ -13,8 +13,8 @@ struct SeenRectangle {
 
 VLP_HD inline float area(const SeenRectangle& r) { return (r.high.x - r.low.x) * (r.high.y - r.low.y); }
 
-// The angles of the spherical rectangle at its four corners, each less a right angle; they add up to the solid angle. The
-// excess over pi / 2 instead of the angle itself keeps digits when the rectangle is small.
+// The angles of the spherical rectangle at its four corners, each less a right angle; they add up to the solid angle.
+// The excess over pi / 2 instead of the angle itself keeps digits when the rectangle is small.
 struct SphericalRectangle {
     float b0, b1;  // z of the unit normals of the planes through the edges y = low.y and y = high.y
     float excess_23;  // of the two corners at low.x

@@ -5,8 +5,8 @@
 
 namespace vlp {
 
-// A triangle as seen from the origin: the unit directions to its corners, and the tangent of half the solid angle it fills
-// as a ratio, which is negative beyond pi.
+// A triangle as seen from the origin: the unit directions to its corners, and the tangent of half the solid angle it
+// fills as a ratio, which is negative beyond pi.
 struct SphericalTriangle {
     Vec3 a, b, c;
     float above, below;

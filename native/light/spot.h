@@ -13,7 +13,8 @@ VLP_HD inline Vec3 spot_to_local(const Light& light, Vec3 direction) {
     return {dot(light.axis_u, direction), dot(light.axis_v, direction), dot(light.normal, direction)};
 }
 
-// Share of the intensity on the axis that leaves in `direction`: smooth in the cosine, over the share `blend` of the cone.
+// Share of the intensity on the axis that leaves in `direction`: smooth in the cosine, over the share `blend` of the
+// cone.
 VLP_HD inline float spot_falloff(const Light& light, Vec3 direction) {
     const Vec3 local = spot_to_local(light, direction);
     const float above = local.z / length(local) - light.cos_outer;

@@ -1,4 +1,4 @@
-// Cameras: rays and projections are each other's inverse, and splatting light onto the film equals tracing rays from it.
+// Cameras: rays and projections are inverses of each other, and splatting light onto the film equals tracing rays.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -20,7 +20,8 @@ struct NamedCamera {
 std::vector<NamedCamera> cameras() {
     CameraParameters p;
     const Frame f = make_frame(normalize(Vec3{0.2f, -0.9f, 0.4f}));
-    const Vec3 columns[4] = {f.tangent * 2.0f, f.bitangent * -0.5f, f.normal * 3.0f, {1, 2, -3}};  // scaled and mirrored
+    const Vec3 columns[4] = {
+        f.tangent * 2.0f, f.bitangent * -0.5f, f.normal * 3.0f, {1, 2, -3}};  // scaled and mirrored
     for (int j = 0; j < 4; ++j) {
         p.transform.m[0][j] = columns[j].x, p.transform.m[1][j] = columns[j].y, p.transform.m[2][j] = columns[j].z;
     }
@@ -87,7 +88,8 @@ TEST(CameraRays, StayBetweenTheClipPlanesAndMeetInTheFocus) {
             EXPECT_NEAR(depth_of(c.camera, ray.origin), c.camera.clip_start, 1e-5);
             EXPECT_NEAR(depth_of(c.camera, ray.origin + ray.t_max * ray.direction), c.camera.clip_end, 2e-5);
             const float cosine = cosine_to_view(c.camera, ray.direction);
-            const Vec3 at_focus = ray.origin + ray.direction * ((c.camera.focus_distance - c.camera.clip_start) / cosine);
+            const Vec3 at_focus =
+                ray.origin + ray.direction * ((c.camera.focus_distance - c.camera.clip_start) / cosine);
             if (i == 0) focus = at_focus;
             EXPECT_LT(length(at_focus - focus), 1e-5f);
             const Vec3 lens = ray.origin - ray.direction * distance_from_lens(c.camera, ray);
@@ -96,7 +98,8 @@ TEST(CameraRays, StayBetweenTheClipPlanesAndMeetInTheFocus) {
             const Vec3 lens_center = middle.origin - middle.direction * distance_from_lens(c.camera, middle);
             radius2 = max_of(radius2, length_squared(lens - lens_center));
         }
-        EXPECT_NEAR(std::sqrt(radius2), c.camera.aperture_radius, 0.02 * static_cast<double>(c.camera.aperture_radius) + 1e-5);
+        EXPECT_NEAR(std::sqrt(radius2), c.camera.aperture_radius,
+                    0.02 * static_cast<double>(c.camera.aperture_radius) + 1e-5);
     }
 }
 
@@ -130,8 +133,8 @@ TEST(CameraRays, ProjectionInvertsThem) {
     }
 }
 
-// A tilted plane that passes both clip planes shines with a radiance that varies; every pixel is measured by rays and by
-// splats of points that are uniform on the plane. 160 comparisons of 5 standard errors: a false-alarm rate of 1e-4.
+// A tilted plane that passes both clip planes shines with a radiance that varies; every pixel is measured by rays and
+// by splats of points that are uniform on the plane. 160 comparisons of 5 standard errors: a false-alarm rate of 1e-4.
 TEST(CameraRays, SplattingLightEqualsTracingRays) {
     Random random{k_seed};
     for (const NamedCamera& c : cameras()) {
@@ -163,7 +166,8 @@ TEST(CameraRays, SplattingLightEqualsTracingRays) {
                 const Ray ray = sample_ray(c.camera, film, random.next_2d());
                 const float t = dot(center - ray.origin, normal) / dot(ray.direction, normal);
                 const Vec3 p = ray.origin + t * ray.direction - center;
-                if (!(t > 0 && t < ray.t_max) || std::fabs(dot(p, u)) > k_half || std::fabs(dot(p, v)) > k_half) continue;
+                if (!(t > 0 && t < ray.t_max) || std::fabs(dot(p, u)) > k_half || std::fabs(dot(p, v)) > k_half)
+                    continue;
                 const double w = static_cast<double>(radiance(dot(p, u), dot(p, v)));
                 rays += w, rays2 += w * w;
             }

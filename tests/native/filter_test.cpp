@@ -18,13 +18,13 @@ TEST(PixelFilter, SamplesFollowTheFilter) {
     for (const Filter filter : k_filters) {
         for (const float width : {1.0f, 1.5f}) {
             const float extent = 2 * filter_radius(filter, width) * (filter == Filter::box ? 1.0f : 0.7f);
-            const auto draw = [&](float(&point)[2]) {
+            const auto draw = [&](float (&point)[2]) {
                 const Vec2 x = sample(filter, width, random.next_2d());
                 EXPECT_LE(max_of(std::fabs(x.x), std::fabs(x.y)), filter_radius(filter, width));
                 point[0] = x.x / extent + 0.5f, point[1] = x.y / extent + 0.5f;
                 return point[0] >= 0 && point[0] < 1 && point[1] >= 0 && point[1] < 1;
             };
-            const auto density = [&](const float(&point)[2]) {
+            const auto density = [&](const float (&point)[2]) {
                 return eval(filter, width, {(point[0] - 0.5f) * extent, (point[1] - 0.5f) * extent}) * square(extent);
             };
             const Fit fit = goodness_of_fit({40, 40}, 2000000, 6, random, draw, density);
@@ -47,7 +47,8 @@ TEST(PixelFilter, IntegralIsOne) {
             }
             EXPECT_NEAR(sum, 1, 2e-6);
             // Standard deviations of Cycles' filters in their widths; the window's from its Fourier terms.
-            const double window = 4 * (1.0 / 12 + (-0.48829 + 0.14128 / 4 - 0.01168 / 9) / 0.35875 / (2 * 9.8696044011));
+            const double window =
+                4 * (1.0 / 12 + (-0.48829 + 0.14128 / 4 - 0.01168 / 9) / 0.35875 / (2 * 9.8696044011));
             const double expected = filter == Filter::box ? 1.0 / 12 : filter == Filter::gaussian ? 1.0 / 16 : window;
             const double w = static_cast<double>(width);
             EXPECT_NEAR(spread / (w * w), expected, 2e-5) << static_cast<int>(filter);

@@ -18,8 +18,8 @@ struct Fit {
 inline constexpr double k_sliver = 1e-4, k_integral_error = 0.01;
 
 // `draw(point)` fills a point of the unit hypercube and says whether the draw was valid; `density(point)` is per unit
-// volume of it. Invalid draws are a cell of their own, which the density expects to hold what it lacks to 1. Draws where
-// the density is 0 give p = 0. Each cell's integral takes `subdivision` ^ N stratified points.
+// volume of it. Invalid draws are a cell of their own, which the density expects to hold what it lacks to 1. Draws
+// where the density is 0 give p = 0. Each cell's integral takes `subdivision` ^ N stratified points.
 template <int N, typename Draw, typename Density>
 Fit goodness_of_fit(const int (&cells)[N], int draws, int subdivision, Random& random, Draw&& draw, Density&& density) {
     size_t cell_count = 1, sub_count = 1;

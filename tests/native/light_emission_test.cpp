@@ -1,4 +1,4 @@
-// First rays of light paths: they follow their density, carry the watts asked for, and light a surface as next event does.
+// First rays of light paths: they follow their density, carry the watts asked for, and light a disc as next event does.
 #include <gtest/gtest.h>
 
 #include "light_scenes.h"
@@ -17,9 +17,7 @@ Emission draw_emission(LightScene& s, Random& random) {
 struct PositionMap {
     const LightScene& s;
 
-    bool round() const {
-        return s.light.radius > 0 && !is_infinite(s.light);
-    }
+    bool round() const { return s.light.radius > 0 && !is_infinite(s.light); }
     float area() const {
         if (is_infinite(s.light)) return k_pi * square(s.view.radius);
         return is_delta(s.light) ? 1.0f : s.light.area;
@@ -92,7 +90,7 @@ TEST(LightEmission, RaysFollowTheirDensity) {
         const bool one_direction = s.light.kind == LightKind::sun && is_delta(s.light);
         const bool one_place = is_delta(s.light) && !is_infinite(s.light);
         const DirectionMap map = one_direction ? DirectionMap{} : directions_of(s, random);
-        const auto draw = [&](float(&point)[4]) {
+        const auto draw = [&](float (&point)[4]) {
             const Emission e = draw_emission(s, random);
             const Vec2 p = positions.point(e.position, e.direction);
             const Vec2 d = one_direction ? Vec2{0.5f, 0.5f} : map.point(e.direction);
@@ -101,7 +99,7 @@ TEST(LightEmission, RaysFollowTheirDensity) {
             if (one_direction) point[2] = random.next(), point[3] = random.next();
             return true;
         };
-        const auto density = [&](const float(&point)[4]) {
+        const auto density = [&](const float (&point)[4]) {
             const Vec3 d = one_direction ? s.light.normal : map.direction({point[2], point[3]});
             const Vec3 p = one_place ? s.light.position : positions.position({point[0], point[1]}, d);
             const EmissionPdf pdf = pdf_emission(s.scene(), s.light, p, normal_at(s, p, d), d);
@@ -126,8 +124,8 @@ TEST(LightEmission, DensitiesAndWeightsAgreeWithEmittedRadiance) {
             ASSERT_NEAR(pdf.direction / e.pdf_direction, 1, 1e-3f);
             const float cosine = is_infinite(s.light) ? 1.0f : dot(e.normal, e.direction);
             ASSERT_GT(cosine, 0);
-            const Rgb expected =
-                emitted(s.scene(), s.light, e.position, e.normal, e.direction) * (cosine / (pdf.position * pdf.direction));
+            const Rgb expected = emitted(s.scene(), s.light, e.position, e.normal, e.direction) *
+                                 (cosine / (pdf.position * pdf.direction));
             ASSERT_NEAR(e.weight.r, expected.r, 1e-3f * expected.r + 1e-4f);
             ASSERT_NEAR(e.weight.g * 3, e.weight.r * 2, 1e-5f * e.weight.r);
             ASSERT_NEAR(e.weight.b * 3, e.weight.r, 1e-5f * e.weight.r);
@@ -156,22 +154,23 @@ TEST(LightEmission, CarriesTheWattsAskedFor) {
                 const double f = 3 * static_cast<double>(spot_falloff(s.light, sample_sphere(random.next_2d())));
                 lit += f, lit_squares += f * f;
             }
-            const double truth = lit / k_draws, lit_error = std::sqrt((lit_squares / k_draws - truth * truth) / k_draws);
+            const double truth = lit / k_draws,
+                         lit_error = std::sqrt((lit_squares / k_draws - truth * truth) / k_draws);
             EXPECT_NEAR(mean, truth, 5 * std::hypot(error, lit_error) + 1e-4 * truth) << "seed " << k_seed;
         }
     }
 }
 
-// The mean irradiance of a disc, once by what light paths carry onto it and once by next event from its points. Both means
-// are over many draws; they may differ by 5 standard errors: 60 comparisons, a false-alarm rate of 4e-5.
+// The mean irradiance of a disc, once by what light paths carry onto it and once by next event from its points. Both
+// means are over many draws; they may differ by 5 standard errors: 60 comparisons, a false-alarm rate of 4e-5.
 TEST(LightEmission, LightsADiscAsNextEventDoes) {
     Random random{k_seed};
     constexpr float k_radius = 0.5f;
     constexpr int k_rays = 400000, k_points = 100000;
     const Vec3 axis = -turned({}).column(2), side = turned({}).column(0);
     for (LightScene& s : light_scenes()) {
-        for (const Vec3 center : {k_light_position + axis * 1.3f + side * 0.2f, k_light_position + side * 1.1f + axis * 0.6f,
-                                  k_light_position - axis * 1.2f}) {
+        for (const Vec3 center : {k_light_position + axis * 1.3f + side * 0.2f,
+                                  k_light_position + side * 1.1f + axis * 0.6f, k_light_position - axis * 1.2f}) {
             SCOPED_TRACE(s.name);
             const Vec3 normal = normalize(k_light_position - center + side * 0.5f);
             const Frame frame = make_frame(normal);
@@ -180,7 +179,8 @@ TEST(LightEmission, LightsADiscAsNextEventDoes) {
                 const Emission e = draw_emission(s, random);
                 const float cosine = -dot(e.direction, normal);
                 const float t = dot(e.position - center, normal) / cosine;
-                const bool inward = s.light.kind == LightKind::sphere && dot(e.position - s.light.position, e.normal) < 0;
+                const bool inward =
+                    s.light.kind == LightKind::sphere && dot(e.position - s.light.position, e.normal) < 0;
                 if (inward) continue;  // its far side stops the ray
                 if (!(cosine > 0 && t > 0) || length(e.position + t * e.direction - center) > k_radius) continue;
                 const double w = static_cast<double>(e.weight.r) / static_cast<double>(k_pi * square(k_radius));
@@ -202,12 +202,31 @@ TEST(LightEmission, LightsADiscAsNextEventDoes) {
     }
 }
 
+// Smoothstep of the cosine within the blended share of the cone; a lamp stretched along its x has a cone so much wider.
+TEST(LightEmission, SpotsFallOffSmoothly) {
+    constexpr float k_size = 1.0f, k_blend = 0.5f;
+    const Light light = make_spot(Affine{}, k_power, k_size, k_blend, 0).value();
+    Affine stretch;
+    stretch.m[0][0] = 2;
+    const Light stretched = make_spot(stretch, k_power, k_size, k_blend, 0).value();
+    const float cos_outer = std::cos(0.5f * k_size);
+    for (const float x : {-0.1f, 0.1f, 0.25f, 0.5f, 0.9f, 1.1f}) {
+        const float c = cos_outer + x * k_blend * (1 - cos_outer), s = std::sqrt(1 - c * c);
+        const float expected = x <= 0 ? 0 : x >= 1 ? 1 : x * x * (3 - 2 * x);
+        for (const Vec3 d : {Vec3{s, 0, -c}, Vec3{0, -s, -c}}) EXPECT_NEAR(spot_falloff(light, d), expected, 2e-5f);
+        EXPECT_NEAR(spot_falloff(stretched, normalize(Vec3{2 * s, 0, -c})), expected, 2e-5f);
+        EXPECT_NEAR(spot_falloff(stretched, Vec3{0, s, -c}), expected, 2e-5f);
+    }
+    EXPECT_EQ(spot_falloff(light, {0, 0, 1}), 0);
+    EXPECT_NEAR(emitted(SceneView{}, light, {}, {}, {0, 0, -1}).r, 3 / (4 * k_pi), 1e-6f);
+}
+
 // Light paths don't start on the inner side of a lamp's sphere, though next event sees it.
 TEST(LightEmission, SphereLampsShineOutward) {
     for (LightScene& s : light_scenes()) {
         if (s.name != "point_sphere" && s.name != "spot_sphere") continue;
         const NextEvent e = sample_next_event(s.scene(), s.light, k_light_position + Vec3{0.1f, 0, 0}, {0.3f, 0.6f});
-        ASSERT_TRUE(e.valid());
+        ASSERT_TRUE(e.drawn());
         EXPECT_LT(dot(e.normal, e.position - k_light_position), 0);
         const EmissionPdf pdf = pdf_emission(s.scene(), s.light, e.position, e.normal, -e.direction);
         EXPECT_EQ(pdf.position * pdf.direction, 0);

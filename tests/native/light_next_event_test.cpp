@@ -31,7 +31,7 @@ DirectionMap directions_toward(LightScene& s, Vec3 receiver, Random& random) {
     const bool inside = sphere && length(k_light_position - receiver) < s.light.radius;
     for (int i = 0; i < 20000; ++i) {
         const NextEvent e = sample_next_event(s.scene(), s.light, receiver, random.next_2d());
-        if (e.valid()) found.push_back(e.direction), sum += e.direction;
+        if (e.drawn()) found.push_back(e.direction), sum += e.direction;
     }
     if (found.empty() || inside || length(sum) < 0.05f * static_cast<float>(found.size())) return all;
     all.frame = make_frame(normalize(sum));
@@ -41,7 +41,8 @@ DirectionMap directions_toward(LightScene& s, Vec3 receiver, Random& random) {
     return all;
 }
 
-// 20 lights x 6 receivers, less those that can't be hit: about 90 fits of significance 1e-6, a false-alarm rate of 1e-4.
+// 20 lights x 6 receivers, less those that can't be hit: about 90 fits of significance 1e-6, a false-alarm rate of
+// 1e-4.
 TEST(LightNextEvent, SamplesFollowTheDensityOfHits) {
     Random random{k_seed};
     for (LightScene& s : light_scenes()) {
@@ -49,14 +50,14 @@ TEST(LightNextEvent, SamplesFollowTheDensityOfHits) {
         for (const Receiver& r : receivers()) {
             SCOPED_TRACE(s.name + ", " + r.name);
             const DirectionMap map = directions_toward(s, r.position, random);
-            const auto draw = [&](float(&point)[2]) {
+            const auto draw = [&](float (&point)[2]) {
                 const NextEvent e = sample_next_event(s.scene(), s.light, r.position, random.next_2d());
-                if (!e.valid()) return false;
+                if (!e.drawn()) return false;
                 const Vec2 p = map.point(e.direction);
                 point[0] = p.x, point[1] = p.y;
                 return true;
             };
-            const auto density = [&](const float(&point)[2]) {
+            const auto density = [&](const float (&point)[2]) {
                 const Vec3 d = map.direction({point[0], point[1]});
                 const LightHit hit = hit_light(s, {r.position, d});
                 if (!hit.found) return 0.0f;
@@ -81,7 +82,7 @@ TEST(LightNextEvent, SamplesAgreeWithHits) {
             int missed = 0, valid = 0;
             for (int i = 0; i < 2000; ++i) {
                 const NextEvent e = sample_next_event(s.scene(), s.light, r.position, random.next_2d());
-                if (!e.valid()) continue;
+                if (!e.drawn()) continue;
                 ++valid;
                 ASSERT_NEAR(length(e.direction), 1, 1e-5);
                 ASSERT_EQ(e.delta, is_delta(s.light));
@@ -126,8 +127,8 @@ TEST(LightNextEvent, SurfacesAreNamedAndLampsAreNot) {
     }
 }
 
-// Points that next event never draws have no density: the far side of a sphere from outside, the back of an area lamp, and
-// what lies outside the beam of a spread one.
+// Points that next event never draws have no density: the far side of a sphere from outside, the back of an area lamp,
+// and what lies outside the beam of a spread one.
 TEST(LightNextEvent, PointsNeverDrawnHaveNoDensity) {
     const Vec3 o = k_light_position, axis = -turned({}).column(2), side = turned({}).column(0);
     const auto pdf = [&](LightScene s, Vec3 receiver, Vec3 position, Vec3 normal) {
@@ -186,7 +187,8 @@ TEST(LightNextEvent, IrradianceEqualsClosedForms) {
         const double disc = watts / (pi * 0.25) / (1 + 4 * static_cast<double>(h * h));  // L pi R² / (R² + h²), R = 1/2
         check({"disc", make_area(turned(o), k_power, 1, 1, true, k_pi), 0}, o + axis * h, -axis, disc);
         // Form factor of a square of side 1 seen by a small parallel surface under its centre.
-        const double x = 0.5 / std::sqrt(0.25 + static_cast<double>(h * h)), a = std::atan(0.5 / std::sqrt(0.25 + static_cast<double>(h * h)));
+        const double x = 0.5 / std::sqrt(0.25 + static_cast<double>(h * h)),
+                     a = std::atan(0.5 / std::sqrt(0.25 + static_cast<double>(h * h)));
         check({"square", make_area(turned(o), k_power, 1, 1, false, k_pi), 0}, o + axis * h, -axis,
               watts / pi * 4 * x * a);
     }

@@ -1,4 +1,4 @@
-// Lights at the ends of single precision and of sense: never NaN, never a negative density, clear refusals; light choice.
+// Lights at the ends of single precision and of sense: no NaN, no negative density, clear refusals; light choice.
 #include <gtest/gtest.h>
 
 #include "light/light_choice.h"
@@ -33,7 +33,8 @@ TEST(LightRobustness, AnyReceiverAndAnyNumbers) {
         scenes.emplace_back("long area", make_area(turned(o), k_power, size, 1, true, 1), 0);
         scenes.emplace_back("narrow sun", make_sun(turned(o), k_power, size), 0);
         scenes.emplace_back("tiny or huge sphere", make_sphere(o, size, k_power, 0, 0), 0);
-        scenes.emplace_back("sliver", make_triangle(o, o + Vec3{1, 0, 0}, o + Vec3{0.5f, 1e-4f, size}, k_power, 0, 0), 0);
+        scenes.emplace_back("sliver", make_triangle(o, o + Vec3{1, 0, 0}, o + Vec3{0.5f, 1e-4f, size}, k_power, 0, 0),
+                            0);
     }
     const float ends[] = {0, 0x1p-24f, 0.25f, 0.5f, 0.75f, 1 - 0x1p-24f};
     for (LightScene& s : scenes) {
@@ -41,9 +42,9 @@ TEST(LightRobustness, AnyReceiverAndAnyNumbers) {
         std::vector<Vec3> places = {o, o + Vec3{1e-30f, 0, 0}, o + Vec3{1e30f, 0, 0}};
         for (int i = 0; i < 60; ++i) {
             const Emission e = sample_emission(s.scene(), s.light, random.next_2d(), random.next_2d());
-            places.push_back(e.position);                                // on it
-            places.push_back(e.position + e.normal * 1e-7f);             // just above
-            places.push_back(o + s.light.axis_u * 3.0f);                 // in the plane of an area lamp
+            places.push_back(e.position);  // on it
+            places.push_back(e.position + e.normal * 1e-7f);  // just above
+            places.push_back(o + s.light.axis_u * 3.0f);  // in the plane of an area lamp
             places.push_back(o + sample_sphere(random.next_2d()) * std::pow(10.0f, 20 * random.next() - 8));
         }
         for (const float x : ends) {
@@ -54,7 +55,8 @@ TEST(LightRobustness, AnyReceiverAndAnyNumbers) {
                 }
                 for (const Vec3 place : places) {
                     const NextEvent e = sample_next_event(s.scene(), s.light, place, {x, y});
-                    ASSERT_TRUE(sane(e)) << place.x << " " << place.y << " " << place.z << " pdf " << e.pdf_solid_angle << " t " << e.distance;
+                    ASSERT_TRUE(sane(e)) << place.x << " " << place.y << " " << place.z << " pdf " << e.pdf_solid_angle
+                                         << " t " << e.distance;
                 }
             }
         }
@@ -90,6 +92,8 @@ TEST(LightRobustness, DegenerateLampsAreRefused) {
     EXPECT_FALSE(make_triangle({0, 0, 0}, {1, 1, 1}, {2, 2, 2}, k_power, 0, 0));
     EXPECT_FALSE(make_triangle({0, 0, 0}, {1, nan, 1}, {2, 1, 2}, k_power, 0, 0));
     EXPECT_FALSE(make_sphere({}, 0, k_power, 0, 0));
+    EXPECT_GT(power(make_point({}, {-1, -1, -1}, 0).value(), 1), 0);
+    EXPECT_TRUE(is_finite(power(make_environment(k_power), 1e30f)));
     EXPECT_TRUE(make_area(turned({}, {1, 1, 0}), k_power, 1, 1, false, 1));  // its thickness is of no use
 }
 
@@ -130,6 +134,10 @@ TEST(LightChoice, WidthsAreExact) {
             EXPECT_NEAR(sum, 1, 1e-6);
         }
     }
+    const double odd[] = {-1, std::nan(""), 3, 1e308, INFINITY};
+    const std::vector<uint32_t> below = make_distribution(odd);
+    EXPECT_NEAR(pdf({below.data(), 5}, 4), 0.5, 1e-6);
+    EXPECT_EQ(pdf({below.data(), 5}, 0), 0x1p-32f);
     EXPECT_TRUE(make_distribution({}).empty());
     EXPECT_EQ(choose_light(SceneView{}, 7).index, k_none);
 }

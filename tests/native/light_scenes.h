@@ -27,7 +27,8 @@ struct LightScene {
     uint32_t index = 0;
     SceneView view;
 
-    LightScene(std::string n, const std::optional<Light>& l, double w) : name(std::move(n)), light(l.value()), watts(w) {
+    LightScene(std::string n, const std::optional<Light>& l, double w)
+        : name(std::move(n)), light(l.value()), watts(w) {
         view.center = {1, -2, 0.5f};
         view.radius = 4;
     }
@@ -117,9 +118,8 @@ inline LightHit hit_light(LightScene& s, const Ray& ray) {
         hit.position = ray.origin + hit.t * ray.direction;
         hit.normal = emission_normal(light, hit.position, -ray.direction);
     } else {
-        for_each_lamp_hit(s.scene(), ray, [&](uint32_t, float t, Vec3 position, Vec3 normal) {
-            hit = {true, t, position, normal};
-        });
+        for_each_lamp_hit(s.scene(), ray,
+                          [&](uint32_t, float t, Vec3 position, Vec3 normal) { hit = {true, t, position, normal}; });
     }
     return hit;
 }
