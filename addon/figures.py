@@ -34,7 +34,8 @@ def status(statistics: Any, progress: Any) -> str:
         f"Mem {memory(statistics.memory_bytes)}",
     ]
     if progress.remaining is not None:
-        parts.append(f"{duration(progress.remaining)} left")
+        minutes, seconds = divmod(round(progress.remaining), 60)
+        parts.append(f"{minutes // 60}:{minutes % 60:02d}:{seconds:02d} left")
     return " | ".join(parts)
 
 

@@ -36,7 +36,10 @@ def export_material(material: Any, notes: Notes) -> Material:
         if graph.output(identifier) is not None:
             notes.warn(f"{graph.owner}: {kind} not there yet, left out")
     surface = _shader(graph, graph.output("Surface"), 0)
-    return replace(surface, name=material.name)
+    if min(surface.emission) < 0:
+        notes.warn(f"{graph.owner}: negative emission is not there yet, taken as zero")
+    red, green, blue = (max(channel, 0.0) for channel in surface.emission)
+    return replace(surface, name=material.name, emission=(red, green, blue))
 
 
 def _shader(graph: Graph, place: Place | None, depth: int) -> Material:

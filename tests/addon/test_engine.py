@@ -247,7 +247,7 @@ def test_render_visibility_is_that_of_renders(out: Path, fake: list[FakeRenderer
 def test_the_status_line_says_how_it_goes(out: Path, watch: Watch) -> None:
     scenes.camera()
     render()
-    assert watch.lines[-1] == ("Iteration 2/2 | 0.00 Mpaths/s | 42 VLPs | Mem 1.0 MB | 00:00:02.00 left | 1 warning")
+    assert watch.lines[-1] == ("Iteration 2/2 | 0.00 Mpaths/s | 42 VLPs | Mem 1.0 MB | 0:00:02 left | 1 warning")
 
 
 def test_esc_keeps_the_picture_so_far(

@@ -96,6 +96,14 @@ def test_emission() -> None:
     check(made, materials.emission(RED, 5))
 
 
+def test_negative_emission_is_named() -> None:
+    made, (node,) = scenes.material("m", "ShaderNodeEmission")
+    put(node, Color=RED, Strength=-5)
+    notes = Notes()
+    assert exported(made, notes).emission == (0, 0, 0)
+    assert len(notes.warnings) == 1
+
+
 @pytest.mark.parametrize("fresnel", ["F82", "PHYSICAL_CONDUCTOR"])
 def test_metallic(fresnel: str) -> None:
     made, (node,) = scenes.material("m", "ShaderNodeBsdfMetallic")
