@@ -3,6 +3,7 @@
 
 #include "bsdf_cases.h"
 #include "chi_squared.h"
+#include "random_numbers.h"
 
 namespace vlp {
 namespace {
@@ -38,8 +39,8 @@ ChiSquared compare(const BuiltCase& built, const View& view, Part part, Walk wal
         return part == Part::all || reflects == (part == Part::reflected);
     };
     const auto draw = [&]() -> std::optional<Vec3> {
-        const float u_lobe = uniform(random);
-        const BsdfSample s = sample(bsdf, view.from, walk, u_lobe, uniform_2d(random));
+        const float u_lobe = random.next();
+        const BsdfSample s = sample(bsdf, view.from, walk, u_lobe, random.next_2d());
         if (!(s.pdf_solid_angle > 0) || s.specular || !in_part(s.direction)) return std::nullopt;
         return s.direction;
     };
@@ -52,7 +53,7 @@ ChiSquared compare(const BuiltCase& built, const View& view, Part part, Walk wal
 TEST(BsdfSampling, DirectionsFollowTheDensity) {
     const std::vector<BsdfCase> cases = finite_cases();
     const std::vector<View> all_views = views();
-    const double threshold = family_threshold(k_false_alarm, 2 * cases.size() * all_views.size());
+    const double threshold = sidak(k_false_alarm, 2 * cases.size() * all_views.size());
     uint32_t seed = 0;
     for (const BsdfCase& c : cases) {
         const BuiltCase built(c.input);
@@ -78,7 +79,7 @@ TEST(BsdfSampling, DirectionsFollowTheDensity) {
 TEST(BsdfSampling, TheTestFindsWhatIsWrong) {
     const Vec3 normal{0, 0, 1};
     Random random{5};
-    const auto cosine = [&]() -> std::optional<Vec3> { return sample_cosine(normal, normal, 1, uniform_2d(random)); };
+    const auto cosine = [&]() -> std::optional<Vec3> { return sample_cosine(normal, normal, 1, random.next_2d()); };
     const auto right = [](Vec3 w) { return w.z > 0 ? k_inv_pi * static_cast<double>(w.z) : 0.0; };
     EXPECT_GT(chi_squared(cosine, right, {}, k_draws).p, 1e-4);
     const auto wrong = [&](Vec3 w) { return right(w) * (1 + 0.1 * static_cast<double>(w.x)); };
@@ -88,7 +89,7 @@ TEST(BsdfSampling, TheTestFindsWhatIsWrong) {
         return w.x > 0.9f ? Vec3{-w.x, w.y, w.z} : w;
     };
     EXPECT_LT(chi_squared(no_corner, right, {}, k_draws).p, 1e-6);
-    const auto refusing = [&]() -> std::optional<Vec3> { return uniform(random) < 0.005f ? std::nullopt : cosine(); };
+    const auto refusing = [&]() -> std::optional<Vec3> { return random.next() < 0.005f ? std::nullopt : cosine(); };
     EXPECT_LT(chi_squared(refusing, right, {}, k_draws).p, 1e-6);
 }
 

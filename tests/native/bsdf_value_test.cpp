@@ -5,6 +5,7 @@
 
 #include "bsdf_cases.h"
 #include "chi_squared.h"
+#include "random_numbers.h"
 
 namespace vlp {
 namespace {
@@ -22,8 +23,8 @@ using namespace test;
 ::testing::AssertionResult close(float a, float b, float tolerance) { return close(rgb(a), rgb(b), tolerance); }
 
 BsdfSample draw(const Bsdf& bsdf, Vec3 from, Walk walk, Random& random) {
-    const float u_lobe = uniform(random);
-    return sample(bsdf, from, walk, u_lobe, uniform_2d(random));
+    const float u_lobe = random.next();
+    return sample(bsdf, from, walk, u_lobe, random.next_2d());
 }
 
 TEST(BsdfValue, WeightsAndDensitiesOfSamplesMatchEval) {
@@ -206,8 +207,8 @@ TEST(BsdfValue, SpecularWeightsFollowFromNarrowLobes) {
             const Bsdf b = narrow.bsdf(view.geometric_normal, view.shading_normal);
             for (const Walk walk : {Walk::eye, Walk::light}) {
                 for (int i = 0; i < 20; ++i) {
-                    const float u_lobe = uniform(random);
-                    const Vec2 u{uniform(random), 0.9f * uniform(random)};
+                    const float u_lobe = random.next();
+                    const Vec2 u{random.next(), 0.9f * random.next()};
                     const BsdfSample s = sample(a, view.from, walk, u_lobe, u),
                                      n = sample(b, view.from, walk, u_lobe, u);
                     SCOPED_TRACE("kind " + std::to_string(static_cast<int>(input.kind)) + ", " + view.name +

@@ -7,7 +7,7 @@
 #include "camera/projection.h"
 #include "goodness_of_fit.h"
 
-namespace vlp::testing {
+namespace vlp::test {
 namespace {
 
 constexpr uint32_t k_seed = 20240615;
@@ -204,4 +204,4 @@ TEST(CameraRays, SenselessCamerasAreRefused) {
 }
 
 }  // namespace
-}  // namespace vlp::testing
+}  // namespace vlp::test

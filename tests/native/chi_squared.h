@@ -1,7 +1,7 @@
 // Chi-squared test of any sampler of directions against the density that it claims, narrow lobes included.
 //
 // Bins cover the whole sphere around an axis; what the sampler refuses is one more bin, which must hold what the
-// density leaves of 1. Use `family_threshold` to keep the chance of a false alarm over a whole family of tests.
+// density leaves of 1. Use `sidak` to keep the chance of a false alarm over a whole family of tests.
 #pragma once
 
 #include <algorithm>
@@ -11,14 +11,9 @@
 #include <vector>
 
 #include "core/frame.h"
-#include "goodness_of_fit.h"
+#include "tails.h"
 
 namespace vlp::test {
-
-// The p below which one of `tests` independent tests fails, for a chance of `false_alarm` that any does (Sidak).
-inline double family_threshold(double false_alarm, size_t tests) {
-    return -std::expm1(std::log1p(-false_alarm) / static_cast<double>(tests));
-}
 
 struct ChiSquared {
     double p = 0;         // probability of a misfit at least as bad, if the densities are right

@@ -6,7 +6,7 @@
 #include "film/filter.h"
 #include "goodness_of_fit.h"
 
-namespace vlp::testing {
+namespace vlp::test {
 namespace {
 
 constexpr uint32_t k_seed = 20240614;
@@ -72,4 +72,4 @@ TEST(PixelFilter, BlackmanHarrisInverse) {
 }
 
 }  // namespace
-}  // namespace vlp::testing
+}  // namespace vlp::test

@@ -5,8 +5,9 @@
 
 #include "chi_squared.h"
 #include "core/frame.h"
+#include "random_numbers.h"
 
-namespace vlp::testing {
+namespace vlp::test {
 
 struct Fit {
     double p = 0;         // probability of a worse fit by chance
@@ -86,4 +87,4 @@ struct DirectionMap {
     float solid_angle() const { return k_two_pi * one_minus_cos; }
 };
 
-}  // namespace vlp::testing
+}  // namespace vlp::test

@@ -3,7 +3,7 @@
 
 #include "light_scenes.h"
 
-namespace vlp::testing {
+namespace vlp::test {
 namespace {
 
 constexpr uint32_t k_seed = 20240612;
@@ -234,4 +234,4 @@ TEST(LightEmission, SphereLampsShineOutward) {
 }
 
 }  // namespace
-}  // namespace vlp::testing
+}  // namespace vlp::test

@@ -3,7 +3,7 @@
 
 #include "light_scenes.h"
 
-namespace vlp::testing {
+namespace vlp::test {
 namespace {
 
 constexpr uint32_t k_seed = 20240611;
@@ -202,4 +202,4 @@ TEST(LightNextEvent, IrradianceEqualsClosedForms) {
 }
 
 }  // namespace
-}  // namespace vlp::testing
+}  // namespace vlp::test

@@ -4,7 +4,7 @@
 #include "light/light_choice.h"
 #include "light_scenes.h"
 
-namespace vlp::testing {
+namespace vlp::test {
 namespace {
 
 constexpr uint32_t k_seed = 20240613;
@@ -188,4 +188,4 @@ TEST(LightChoice, TenThousandLamps) {
 }
 
 }  // namespace
-}  // namespace vlp::testing
+}  // namespace vlp::test

@@ -8,7 +8,7 @@
 #include "light/light.h"
 #include "light/light_build.h"
 
-namespace vlp::testing {
+namespace vlp::test {
 
 // Turned, so that no axis hides an error; `scale` along its own axes.
 inline Affine turned(Vec3 position, Vec3 scale = {1, 1, 1}) {
@@ -124,4 +124,4 @@ inline LightHit hit_light(LightScene& s, const Ray& ray) {
     return hit;
 }
 
-}  // namespace vlp::testing
+}  // namespace vlp::test

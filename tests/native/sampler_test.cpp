@@ -78,7 +78,7 @@ public:
         double statistic = 0;
         const double expected = count_ / (k_side * k_side);
         for (const double seen : cells_) statistic += (seen - expected) * (seen - expected) / expected;
-        return chi_squared_upper_tail(statistic, k_side * k_side - 1);
+        return chi_squared_tail(statistic, k_side * k_side - 1);
     }
 
 private:

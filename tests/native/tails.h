@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 namespace vlp::test {
 
@@ -13,11 +14,28 @@ inline double sidak(double false_alarm, size_t tests) {
 // Of |z| or more standard deviations.
 inline double normal_tails(double z) { return std::erfc(std::fabs(z) / std::sqrt(2.0)); }
 
-// Of a chi-squared variable of many degrees of freedom (Wilson & Hilferty 1931: its cube root is nearly normal); for 255
-// degrees its relative error is below 2 % down to a tail of 1e-5.
-inline double chi_squared_upper_tail(double statistic, double freedom) {
-    const double v = 2 / (9 * freedom);
-    return 0.5 * std::erfc((std::cbrt(statistic / freedom) - (1 - v)) / std::sqrt(2 * v));
+// Probability that a chi-squared variable of `freedom` degrees exceeds `statistic`: the regularised upper incomplete
+// gamma function, by its series or its continued fraction (Lentz), whichever converges.
+inline double chi_squared_tail(double statistic, double freedom) {
+    const double a = freedom / 2, x = statistic / 2;
+    if (x <= 0) return 1;
+    const double scale = std::exp(a * std::log(x) - x - std::lgamma(a));
+    if (x < a + 1) {
+        double term = 1 / a, sum = term;
+        for (double n = a + 1; term > sum * 1e-16; n += 1) sum += term *= x / n;
+        return 1 - scale * sum;
+    }
+    double b = x + 1 - a, c = 1e300, d = 1 / b, h = d;
+    for (int i = 1; i < 100000; ++i) {
+        const double an = -i * (i - a);
+        b += 2;
+        d = 1 / (an * d + b);
+        c = b + an / c;
+        const double change = c * d;
+        h *= change;
+        if (std::fabs(change - 1) < 1e-15) break;
+    }
+    return scale * h;
 }
 
 }  // namespace vlp::test
