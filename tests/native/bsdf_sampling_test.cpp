@@ -75,7 +75,8 @@ TEST(BsdfSampling, DirectionsFollowTheDensity) {
     }
 }
 
-// The test itself finds a density that is wrong by a few per cent, a sampler that misses a corner, and a lost sample.
+// The test itself finds a density that is wrong by a tenth on one side, a sampler that misses a corner, and a lost sample.
+// With its draws the first adds 4 k_draws E[(0.1 x)^2] = 300 to a statistic that fails 98 above its mean.
 TEST(BsdfSampling, TheTestFindsWhatIsWrong) {
     const Vec3 normal{0, 0, 1};
     Random random{5};
@@ -83,7 +84,7 @@ TEST(BsdfSampling, TheTestFindsWhatIsWrong) {
     const auto right = [](Vec3 w) { return w.z > 0 ? k_inv_pi * static_cast<double>(w.z) : 0.0; };
     EXPECT_GT(chi_squared(cosine, right, {}, k_draws).p, 1e-4);
     const auto wrong = [&](Vec3 w) { return right(w) * (1 + 0.1 * static_cast<double>(w.x)); };
-    EXPECT_LT(chi_squared(cosine, wrong, {}, k_draws).p, 1e-6);
+    EXPECT_LT(chi_squared(cosine, wrong, {}, 4 * k_draws).p, 1e-6);
     const auto no_corner = [&]() -> std::optional<Vec3> {
         const Vec3 w = *cosine();
         return w.x > 0.9f ? Vec3{-w.x, w.y, w.z} : w;
