@@ -103,7 +103,8 @@ def capture_blend(path: Path, frame: int | None, values: dict[str, Any]) -> tupl
 
 def _open(path: Path, frame: int | None, values: dict[str, Any]) -> Any:
     try:
-        bpy = importlib.import_module("bpy")
+        with _console():
+            bpy = importlib.import_module("bpy")
     except ImportError as error:
         text = "rendering a .blend needs Blender as a Python module (pip install bpy), or run it inside Blender: "
         raise BlenderError(f"'{path}': {text}blender -b {path} -E VLP_BPT -f 1 ({error})") from error

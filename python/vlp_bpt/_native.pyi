@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Float32 = NDArray[np.float32]
-Int32 = NDArray[np.int32]
-Triple = tuple[float, float, float]
+_Float32 = NDArray[np.float32]
+_Int32 = NDArray[np.int32]
+_Triple = tuple[float, float, float]
 
 __version__: str
 isa: str
@@ -19,57 +19,57 @@ class Scene:
     def __init__(self) -> None: ...
     def add_mesh(
         self,
-        positions: Float32,  # (V, 3)
-        triangles: Int32,  # (T, 3)
-        corner_normals: Float32 | None,  # (T, 3, 3)
-        uvs: Float32 | None,  # (T, 3, 2)
-        material_index: Int32 | None,  # (T,)
+        positions: _Float32,  # (V, 3)
+        triangles: _Int32,  # (T, 3)
+        corner_normals: _Float32 | None,  # (T, 3, 3)
+        uvs: _Float32 | None,  # (T, 3, 2)
+        material_index: _Int32 | None,  # (T,)
     ) -> int: ...
     def add_spheres(
         self,
-        centers: Float32,  # (N, 3)
-        radii: Float32,  # (N,)
-        material_index: Int32 | None,  # (N,)
+        centers: _Float32,  # (N, 3)
+        radii: _Float32,  # (N,)
+        material_index: _Int32 | None,  # (N,)
     ) -> int: ...
     def add_material(
         self,
-        kinds: Int32,  # (n,)
-        fresnels: Int32,  # (n,)
-        weights: Float32,  # (n, 3)
-        roughness: Float32,  # (n,)
-        ior: Float32,  # (n,)
-        f0: Float32,  # (n, 3)
-        f82: Float32,  # (n, 3)
-        layered_under: Int32,  # (n,)
-        compensate: Int32,  # (n,)
-        emission: Triple,
+        kinds: _Int32,  # (n,)
+        fresnels: _Int32,  # (n,)
+        weights: _Float32,  # (n, 3)
+        roughness: _Float32,  # (n,)
+        ior: _Float32,  # (n,)
+        f0: _Float32,  # (n, 3)
+        f82: _Float32,  # (n, 3)
+        layered_under: _Int32,  # (n,)
+        compensate: _Int32,  # (n,)
+        emission: _Triple,
     ) -> int: ...
     def add_instance(
         self,
         geometry: int,
-        transform: Float32,  # (3, 4)
-        materials: Int32,  # (slots,)
+        transform: _Float32,  # (3, 4)
+        materials: _Int32,  # (slots,)
         visibility: int,
     ) -> None: ...
-    def add_point_light(self, position: Triple, power: Triple, radius: float, visibility: int) -> bool: ...
+    def add_point_light(self, position: _Triple, power: _Triple, radius: float, visibility: int) -> bool: ...
     def add_spot_light(
-        self, transform: Float32, power: Triple, spot_size: float, blend: float, radius: float, visibility: int
+        self, transform: _Float32, power: _Triple, spot_size: float, blend: float, radius: float, visibility: int
     ) -> bool: ...
-    def add_sun_light(self, transform: Float32, irradiance: Triple, angle: float, visibility: int) -> bool: ...
+    def add_sun_light(self, transform: _Float32, irradiance: _Triple, angle: float, visibility: int) -> bool: ...
     def add_area_light(
         self,
-        transform: Float32,
-        power: Triple,
+        transform: _Float32,
+        power: _Triple,
         size_x: float,
         size_y: float,
         ellipse: bool,
         spread: float,
         visibility: int,
     ) -> bool: ...
-    def set_world(self, radiance: Triple) -> None: ...
+    def set_world(self, radiance: _Triple) -> None: ...
     def set_camera(
         self,
-        transform: Float32,
+        transform: _Float32,
         projection: int,
         half_width: float,
         half_height: float,
@@ -85,8 +85,8 @@ class Scene:
     ) -> None: ...
     def build(self, threads: int = 0) -> None: ...
     # origins, directions (n, 3), t_max (n,); gives t, u, v, primitive, instance, each (n,)
-    def intersect(self, origins: Float32, directions: Float32, t_max: Float32) -> dict[str, NDArray[Any]]: ...
-    def occluded(self, origins: Float32, directions: Float32, t_max: Float32) -> NDArray[np.uint8]: ...
+    def intersect(self, origins: _Float32, directions: _Float32, t_max: _Float32) -> dict[str, NDArray[Any]]: ...
+    def occluded(self, origins: _Float32, directions: _Float32, t_max: _Float32) -> NDArray[np.uint8]: ...
     def info(self) -> dict[str, Any]: ...
 
 class Renderer:
@@ -95,7 +95,7 @@ class Renderer:
     def cancel(self) -> None: ...
     def set_deadline(self, seconds: float) -> None: ...
     def progress(self) -> float: ...
-    def read(self, out: Float32) -> None: ...  # (height, width, 4)
+    def read(self, out: _Float32) -> None: ...  # (height, width, 4)
     def film_state(self) -> NDArray[np.int64]: ...  # (height, width, 4, 2): low and high words
     def add_film_state(self, state: NDArray[np.int64], iterations: int) -> None: ...
     def memory(self) -> dict[str, int]: ...
