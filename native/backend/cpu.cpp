@@ -135,8 +135,7 @@ private:
         for (uint32_t y = tile.y * k_tile; y < y_end; ++y) {
             for (uint32_t x = tile.x * k_tile; x < x_end; ++x) {
                 PixelSink sink;
-                const float alpha =
-                    trace_eye_path(scene_, pass_, cache, iteration, window.x + x, window.y + y, sink);
+                const float alpha = trace_eye_path(scene_, pass_, cache, iteration, window.x + x, window.y + y, sink);
                 dropped += sink.dropped;
                 const Rgb c = sink.radiance;
                 film.frame()[static_cast<size_t>(y) * window.width + x] = {{c.r, c.g, c.b, alpha}};

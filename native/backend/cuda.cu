@@ -25,7 +25,8 @@ __global__ void light_pass(SceneView scene, PassSettings pass, uint32_t iteratio
 }
 
 // Lists the slots that can be connected, in their order: `end_of_path` is the inclusive scan of stored_in_path.
-__global__ void list_stored(PassSettings pass, const LightVertex* slots, const uint32_t* end_of_path, uint32_t* stored) {
+__global__ void list_stored(PassSettings pass, const LightVertex* slots, const uint32_t* end_of_path,
+                            uint32_t* stored) {
     const uint32_t path = blockIdx.x * blockDim.x + threadIdx.x;
     if (path >= pass.light_paths) return;
     uint32_t next = path == 0 ? 0 : end_of_path[path - 1];

@@ -56,8 +56,18 @@ EmbreeScene::~EmbreeScene() {
 
 float EmbreeScene::closest(const Ray& ray) const {
     RTCRayHit query;
-    query.ray = {ray.origin.x, ray.origin.y, ray.origin.z, 0, ray.direction.x, ray.direction.y, ray.direction.z, 0,
-                 ray.t_max, ~0u, 0, 0};
+    query.ray = {ray.origin.x,
+                 ray.origin.y,
+                 ray.origin.z,
+                 0,
+                 ray.direction.x,
+                 ray.direction.y,
+                 ray.direction.z,
+                 0,
+                 ray.t_max,
+                 ~0u,
+                 0,
+                 0};
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
 #if RTC_VERSION_MAJOR >= 4
@@ -71,8 +81,18 @@ float EmbreeScene::closest(const Ray& ray) const {
 }
 
 bool EmbreeScene::occluded(const Ray& ray) const {
-    RTCRay query = {ray.origin.x, ray.origin.y, ray.origin.z, 0, ray.direction.x, ray.direction.y, ray.direction.z, 0,
-                    ray.t_max, ~0u, 0, 0};
+    RTCRay query = {ray.origin.x,
+                    ray.origin.y,
+                    ray.origin.z,
+                    0,
+                    ray.direction.x,
+                    ray.direction.y,
+                    ray.direction.z,
+                    0,
+                    ray.t_max,
+                    ~0u,
+                    0,
+                    0};
 #if RTC_VERSION_MAJOR >= 4
     rtcOccluded1(handles_->scene, &query);
 #else

@@ -154,7 +154,8 @@ RaySets make_rays(const BenchScene& scene, const Bvh& bvh) {
             return 0.36f * (2 * (static_cast<float>(pixel) + unit_float(random)) / k_size - 1);
         };
         Sampler sampler = make_sampler(i, 0);
-        const Vec3 direction = frame.normal + right * to_film(x, sampler.next_bits()) + up * to_film(y, sampler.next_bits());
+        const Vec3 direction =
+            frame.normal + right * to_film(x, sampler.next_bits()) + up * to_film(y, sampler.next_bits());
         const Ray ray{scene.eye, normalize(direction)};
         sets.camera.push_back(ray);
         const Hit hit = closest_hit(view, ray, {});

@@ -73,9 +73,8 @@ void measure(const BenchScene& scene, unsigned max_threads, int repeats) {
     for (unsigned threads = 1; threads <= max_threads; ++threads) {
         ThreadPool pool(threads);
         for (int i = 0; i < repeats; ++i) {
-            build[threads - 1] = min_of(build[threads - 1], seconds_of([&] {
-                bvh = build_bvh(scene.geometries, scene.instances, pool);
-            }));
+            build[threads - 1] = min_of(build[threads - 1],
+                                        seconds_of([&] { bvh = build_bvh(scene.geometries, scene.instances, pool); }));
         }
     }
     std::printf("  build       %8.4f s, %8.4f s on two threads; %.1f MB\n", build[0], build[1],
@@ -86,7 +85,8 @@ void measure(const BenchScene& scene, unsigned max_threads, int repeats) {
     const auto occluded = over([&](const Ray& ray) { return any_hit(view, ray, {}, {}) ? 1.0 : 0.0; });
 #if VLP_WITH_EMBREE
     double embree_build = 1e9;
-    for (int i = 0; i < repeats; ++i) embree_build = min_of(embree_build, EmbreeScene(scene, max_threads).build_seconds());
+    for (int i = 0; i < repeats; ++i)
+        embree_build = min_of(embree_build, EmbreeScene(scene, max_threads).build_seconds());
     std::printf("  Embree build                %8.4f s\n", embree_build);
     const EmbreeScene embree(scene, max_threads);
     const auto embree_closest = over([&](const Ray& ray) { return finite(embree.closest(ray)); });
@@ -97,8 +97,8 @@ void measure(const BenchScene& scene, unsigned max_threads, int repeats) {
         const std::vector<Ray>* rays;
         bool any;
     };
-    for (const Row& row : {Row{"camera", &sets.camera, false}, Row{"bounce", &sets.bounce, false},
-                           Row{"shadow", &sets.shadow, true}}) {
+    for (const Row& row :
+         {Row{"camera", &sets.camera, false}, Row{"bounce", &sets.bounce, false}, Row{"shadow", &sets.shadow, true}}) {
         for (unsigned threads = 1; threads <= max_threads; ++threads) {
             ThreadPool pool(threads);
             const Rate ours = rate_of(*row.rays, pool, repeats, row.any ? occluded : closest);

@@ -50,7 +50,9 @@ struct Binning {
 
     explicit Binning(const Box& centers) : low(centers.low) {
         const Vec3 e = centers.high - centers.low;
-        const auto bins_per_unit = [](float x) { return x > 0 ? static_cast<float>(k_bins) * (1 - 0x1p-20f) / x : 0.0f; };
+        const auto bins_per_unit = [](float x) {
+            return x > 0 ? static_cast<float>(k_bins) * (1 - 0x1p-20f) / x : 0.0f;
+        };
         scale = {bins_per_unit(e.x), bins_per_unit(e.y), bins_per_unit(e.z)};
     }
     // An extent whose inverse overflows makes infinite scales: min_of keeps every index in range.

@@ -25,13 +25,15 @@ WideTree build_tree(std::vector<Ref>& refs, const LeafSource& source, const uint
 }
 
 // Which instances stand in the world's tree as primitives.
-std::vector<uint8_t> choose_flattened(std::span<const GeometryView> geometries, std::span<const InstanceView> instances) {
+std::vector<uint8_t> choose_flattened(std::span<const GeometryView> geometries,
+                                      std::span<const InstanceView> instances) {
     std::vector<uint32_t> placements(geometries.size());
     for (const InstanceView& instance : instances) ++placements[instance.geometry];
     std::vector<uint8_t> flattened(instances.size());
     for (size_t i = 0; i < instances.size(); ++i) {
         const uint32_t g = instances[i].geometry;
-        const bool worth_it = placements[g] == 1 || uint64_t{placements[g]} * geometries[g].primitive_count <= k_always_flatten;
+        const bool worth_it =
+            placements[g] == 1 || uint64_t{placements[g]} * geometries[g].primitive_count <= k_always_flatten;
         flattened[i] = worth_it && can_flatten(geometries[g], instances[i]);
     }
     return flattened;

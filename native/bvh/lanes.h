@@ -92,8 +92,8 @@ VLP_FORCE_INLINE uint32_t intersect_block(const TraversalRay& ray, const Triangl
         _mm_store_ps(x[0][0], ax), _mm_store_ps(x[0][1], ay), _mm_store_ps(x[0][2], az);
         _mm_store_ps(x[1][0], bx), _mm_store_ps(x[1][1], by), _mm_store_ps(x[1][2], bz);
         _mm_store_ps(x[2][0], cx), _mm_store_ps(x[2][1], cy), _mm_store_ps(x[2][2], cz);
-        const TriangleHit hit = intersect_exactly(x[0][0][i], x[0][1][i], x[0][2][i], x[1][0][i], x[1][1][i], x[1][2][i],
-                                                  x[2][0][i], x[2][1][i], x[2][2][i], r.scale_z, t_max);
+        const TriangleHit hit = intersect_exactly(x[0][0][i], x[0][1][i], x[0][2][i], x[1][0][i], x[1][1][i],
+                                                  x[1][2][i], x[2][0][i], x[2][1][i], x[2][2][i], r.scale_z, t_max);
         if (!hit.found) continue;
         hits.t[i] = hit.t, hits.u[i] = hit.u, hits.v[i] = hit.v;
         mask |= 1u << i;

@@ -34,7 +34,11 @@ bool can_flatten(const GeometryView& geometry, const InstanceView& placement) {
     const Vec3 x = map.column(0), y = map.column(1), z = map.column(2);
     const float scale = (length_squared(x) + length_squared(y) + length_squared(z)) * (1.0f / 3.0f);
     const float tolerance = 2e-6f * scale;  // the rounding of a rotation matrix in single precision
-    const float off[] = {dot(x, y), dot(y, z), dot(z, x), length_squared(x) - scale, length_squared(y) - scale,
+    const float off[] = {dot(x, y),
+                         dot(y, z),
+                         dot(z, x),
+                         length_squared(x) - scale,
+                         length_squared(y) - scale,
                          length_squared(z) - scale};
     for (const float o : off) {
         if (!(std::fabs(o) <= tolerance)) return false;

@@ -18,8 +18,8 @@ VLP_HD inline TraversalRay enter(const InstanceView& instance, const Ray& ray) {
                               transform_vector(instance.world_to_object, ray.direction));
 }
 
-VLP_HD inline float intersect_lane(const TraversalRay& ray, const SphereBlock& block, uint32_t i, float t_max, bool from,
-                                   bool to) {
+VLP_HD inline float intersect_lane(const TraversalRay& ray, const SphereBlock& block, uint32_t i, float t_max,
+                                   bool from, bool to) {
     const Vec3 center{block.center[0][i], block.center[1][i], block.center[2][i]};
     const SphereRoots roots = intersect_sphere(ray.origin, ray.direction, center, block.radius[i]);
     return roots.found ? first_root(roots, t_max, from, to) : k_infinity;
@@ -46,8 +46,8 @@ VLP_HD inline uint64_t make_waiting(float t, uint32_t child) {
 VLP_HD inline float entry_of(uint64_t waiting) { return float_of(static_cast<int32_t>(waiting >> 32)); }
 
 // Puts the children of `mask` (two or more) on the stack, farthest first, but for the nearest, which is returned.
-VLP_HD VLP_FORCE_INLINE uint32_t push_sorted(const BvhView& bvh, const BvhNode& node, uint32_t mask, const float* entry, uint64_t* stack,
-                                             uint32_t& top) {
+VLP_HD VLP_FORCE_INLINE uint32_t push_sorted(const BvhView& bvh, const BvhNode& node, uint32_t mask, const float* entry,
+                                             uint64_t* stack, uint32_t& top) {
     const auto take = [&] {
         const uint32_t i = lowest_bit(mask);
         mask &= mask - 1;
@@ -89,7 +89,8 @@ VLP_HD inline void closest_in_tree(const SceneView& scene, const Ray& world_ray,
                 at_leaf = false;
                 break;
             }
-            child = (mask & (mask - 1)) == 0 ? node.child[lowest_bit(mask)] : push_sorted(bvh, node, mask, entry, stack, top);
+            child = (mask & (mask - 1)) == 0 ? node.child[lowest_bit(mask)]
+                                             : push_sorted(bvh, node, mask, entry, stack, top);
         }
         if (at_leaf) {
             const uint32_t index = child_index(child), end = index + child_blocks(child);
@@ -116,7 +117,8 @@ VLP_HD inline void closest_in_tree(const SceneView& scene, const Ray& world_ray,
                 }
             } else if constexpr (in_world) {
                 const TraversalRay local = enter(scene.instances[index], world_ray);
-                closest_in_tree<false>(scene, world_ray, local, bvh.instance_roots[index], index, skip, stack + top, hit);
+                closest_in_tree<false>(scene, world_ray, local, bvh.instance_roots[index], index, skip, stack + top,
+                                       hit);
             }
         }
         uint64_t next;
@@ -157,10 +159,12 @@ VLP_HD inline bool any_in_tree(const SceneView& scene, const Ray& world_ray, con
                 for (uint32_t b = index; b < end; ++b) {
                     const TriangleBlock& block = bvh.triangle_blocks[b];
                     BlockHits hits;
-                    for (uint32_t mask = intersect_block(ray, block, world_ray.t_max, hits); mask != 0; mask &= mask - 1) {
+                    for (uint32_t mask = intersect_block(ray, block, world_ray.t_max, hits); mask != 0;
+                         mask &= mask - 1) {
                         const uint32_t i = lowest_bit(mask);
                         const uint32_t owner = in_world ? block.instance[i] : instance;
-                        if (!is(skip_a, owner, block.primitive[i]) && !is(skip_b, owner, block.primitive[i])) return true;
+                        if (!is(skip_a, owner, block.primitive[i]) && !is(skip_b, owner, block.primitive[i]))
+                            return true;
                     }
                 }
             } else if (child_kind(child) == ChildKind::spheres) {

@@ -44,8 +44,8 @@ VLP_HD constexpr float unit_float(uint32_t x) { return static_cast<float>(x >> 8
 // The numbers of one path. Each draw takes the next pair of dimensions of a (0, 2)-sequence whose order is shuffled
 // anew by (seed, dimension), so that any 2^k successive indices are stratified in each draw and draws are independent.
 struct Sampler {
-    uint32_t seed = 0;       // of the pixel or of the set of light paths
-    uint32_t index = 0;      // of the path in its sequence, bit-reversed
+    uint32_t seed = 0;  // of the pixel or of the set of light paths
+    uint32_t index = 0;  // of the path in its sequence, bit-reversed
     uint32_t dimension = 0;  // of the next draw
 
     VLP_HD uint32_t next_bits() {
@@ -60,7 +60,8 @@ struct Sampler {
         const uint32_t key = hash(seed, dimension++);
         const uint32_t shuffled = reverse_bits(scramble_reversed(index, key));
         const uint32_t x = reverse_bits(scramble_reversed(shuffled, key * 0x9e3779b1u + 0x7f4a7c15u));
-        const uint32_t y = reverse_bits(scramble_reversed(sobol_second_reversed(shuffled), key * 0x85ebca77u + 0xc2b2ae3du));
+        const uint32_t y =
+            reverse_bits(scramble_reversed(sobol_second_reversed(shuffled), key * 0x85ebca77u + 0xc2b2ae3du));
         return {unit_float(x), unit_float(y)};
     }
 };

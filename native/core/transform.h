@@ -12,7 +12,9 @@ struct Affine {
     VLP_HD Vec3 row(int i) const { return {m[i][0], m[i][1], m[i][2]}; }
 };
 
-VLP_HD inline Vec3 transform_vector(const Affine& a, Vec3 v) { return {dot(a.row(0), v), dot(a.row(1), v), dot(a.row(2), v)}; }
+VLP_HD inline Vec3 transform_vector(const Affine& a, Vec3 v) {
+    return {dot(a.row(0), v), dot(a.row(1), v), dot(a.row(2), v)};
+}
 VLP_HD inline Vec3 transform_point(const Affine& a, Vec3 p) { return transform_vector(a, p) + a.column(3); }
 
 // A normal goes by the inverse transpose; the result is not normalised and keeps its side under mirroring.

@@ -70,7 +70,8 @@ struct LightHits {
 
 private:
     VLP_HD void add(uint32_t light, Vec3 position, Vec3 normal, Rgb through) const {
-        sink.add(hit_light(scene, pass, eye, eye.throughput * through, pdf_solid_angle, light, position, normal, direction));
+        sink.add(
+            hit_light(scene, pass, eye, eye.throughput * through, pdf_solid_angle, light, position, normal, direction));
     }
 };
 

@@ -24,9 +24,9 @@ struct PassSettings {
     bool roulette = false;           // ends walks at random by their throughput instead of at a fixed length
     bool transparent_film = false;   // the camera sees no background
     uint32_t seed = 0;
-    float kappa = 0;                 // C N / V, V being what a pilot pass of the scene stored: how often a VLP is drawn
+    float kappa = 0;  // C N / V, V being what a pilot pass of the scene stored: how often a VLP is drawn
     Filter filter = Filter::blackman_harris;
-    float filter_width = 1.5f;       // full width (pixels)
+    float filter_width = 1.5f;  // full width (pixels)
 };
 
 // The virtual light points of one iteration. Path p keeps its hits y1 ... yL in slots [p L, p L + L); `stored` lists the

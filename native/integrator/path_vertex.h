@@ -14,8 +14,8 @@ struct VertexDensity {
     // Times the solid-angle density of scattering back from this vertex: reverse over forward density of the previous
     // vertex. That is |cos| / dist^2 / pdf_area of the previous vertex; 0 where it cannot be reached by a ray.
     float rev_geometry = 0;
-    float rev_ratio = 0;     // reverse over forward density of the previous vertex, known once the walk has gone on
-    bool specular = false;   // the walk went on by a delta distribution: neither edge here can be a connection
+    float rev_ratio = 0;  // reverse over forward density of the previous vertex, known once the walk has gone on
+    bool specular = false;  // the walk went on by a delta distribution: neither edge here can be a connection
 };
 
 // A light path's hit y_i, i >= 1; a virtual light point when `connectible`. One random read takes one whole cache line.
@@ -26,12 +26,12 @@ struct alignas(64) LightVertex {
 
     Vec3 position;
     OctNormal geometric_normal, shading_normal;
-    OctNormal to_previous;       // unit direction to y_{i-1}
-    Rgb throughput;              // (6): emitted radiance times all factors up to arrival here, over all densities
+    OctNormal to_previous;  // unit direction to y_{i-1}
+    Rgb throughput;  // (6): emitted radiance times all factors up to arrival here, over all densities
     uint32_t instance, primitive;
     float pdf_area, rev_geometry, rev_ratio;  // as in VertexDensity
-    float next_event_ratio;      // y_1: density of next event choosing y_0 over density of emission choosing it
-    uint32_t packed;             // flags, i, material
+    float next_event_ratio;  // y_1: density of next event choosing y_0 over density of emission choosing it
+    uint32_t packed;  // flags, i, material
 
     VLP_HD bool valid() const { return (packed & k_valid) != 0; }
     VLP_HD bool connectible() const { return (packed & k_connectible) != 0; }

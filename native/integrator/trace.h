@@ -60,7 +60,8 @@ VLP_HD inline Step walk(const SceneView& scene, Ray ray, PrimitiveId skip, bool 
         if (!from_camera || (scene.instances[hit.instance].visibility & k_visible_to_camera)) {
             lights.on_surface(step.surface, step.throughput);
             const Material& material = scene.materials[step.surface.material];
-            step.found = material.pass_through <= 0 || unit_float(hash(key, static_cast<uint32_t>(i))) >= material.pass_through;
+            step.found =
+                material.pass_through <= 0 || unit_float(hash(key, static_cast<uint32_t>(i))) >= material.pass_through;
             if (step.found) {
                 step.throughput *= 1.0f / (1.0f - material.pass_through);
                 return step;
@@ -83,7 +84,8 @@ VLP_HD inline Rgb transmittance(const SceneView& scene, Ray ray, PrimitiveId fro
     PrimitiveId skip = from;
     for (int i = 0; i < k_max_transparent; ++i) {
         const Hit hit = closest_hit(scene, ray, skip);
-        if (!hit.found() || (hit.instance == to.instance && hit.primitive == to.primitive && hit.t > 0.999f * ray.t_max)) {
+        if (!hit.found() ||
+            (hit.instance == to.instance && hit.primitive == to.primitive && hit.t > 0.999f * ray.t_max)) {
             return through;
         }
         const SurfacePoint surface = surface_at(scene, ray, hit);

@@ -25,7 +25,7 @@ struct Contribution {
     uint32_t s = 0, t = 0;
     Rgb value{};
     float weight = 0;
-    uint32_t light = k_none;           // s < 2: the light, and the point y_0 (the direction to it where it is infinite)
+    uint32_t light = k_none;  // s < 2: the light, and the point y_0 (the direction to it where it is infinite)
     Vec3 position{}, normal{};
     const LightVertex* vlp = nullptr;  // s >= 2: y_{s-1}
 };

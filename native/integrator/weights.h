@@ -30,9 +30,15 @@ struct StrategySum {
     VLP_HD void add(float ratio, float count) {
         const float relative = ratio * count / own_count;
         switch (weighting) {
-            case Weighting::uniform: sum += relative > 0 ? 1.0f : 0.0f; break;
-            case Weighting::balance: sum += relative; break;
-            case Weighting::power: sum += relative * relative; break;
+            case Weighting::uniform:
+                sum += relative > 0 ? 1.0f : 0.0f;
+                break;
+            case Weighting::balance:
+                sum += relative;
+                break;
+            case Weighting::power:
+                sum += relative * relative;
+                break;
         }
     }
     VLP_HD float weight() const { return 1.0f / sum; }
@@ -45,8 +51,8 @@ VLP_HD inline StrategySum strategy_sum(const PassSettings& pass, uint32_t k) {
 // Adds strategies k_first, k_first + 1, ...: eye vertices become light vertices, from the light's end of the eye walk on.
 // `eye` holds z_0 ... z_{t-1} = x_{n-1} ... x_{n-t}; `ratio` is p_{k_first} over the density at hand without counts, and
 // `next_ratio` is light / eye density of x_{k_first}, which the connection at hand decides; further ones are in `eye`.
-VLP_HD inline void add_longer_light_walks(StrategySum& sum, const PassSettings& pass, const VertexDensity* eye, uint32_t n,
-                                          uint32_t k_first, float ratio, float next_ratio) {
+VLP_HD inline void add_longer_light_walks(StrategySum& sum, const PassSettings& pass, const VertexDensity* eye,
+                                          uint32_t n, uint32_t k_first, float ratio, float next_ratio) {
     // The lens is never joined to a light vertex, so an eye walk keeps z_0 and z_1.
     for (uint32_t k = k_first; k <= pass.light_path_length + 1 && k + 2 <= n && ratio > 0; ++k) {
         const VertexDensity &end = eye[n - 1 - k], &freed = eye[n - k];  // x_k and x_{k-1}
@@ -57,8 +63,8 @@ VLP_HD inline void add_longer_light_walks(StrategySum& sum, const PassSettings& 
 
 // Adds strategies s - 1, s - 2, ..., 0: light vertices become eye vertices, from the virtual light point `vlp` = y_{s-1} back
 // to the light. `ratio` is eye / light density of the VLP and `next_ratio` of the vertex before it, as connected.
-VLP_HD inline void add_shorter_light_walks(StrategySum& sum, const PassSettings& pass, const LightVertex* vlp, uint32_t s,
-                                           uint32_t n, float ratio, float next_ratio) {
+VLP_HD inline void add_shorter_light_walks(StrategySum& sum, const PassSettings& pass, const LightVertex* vlp,
+                                           uint32_t s, uint32_t n, float ratio, float next_ratio) {
     const LightVertex* freed = vlp;  // x_k = y_k, free of the light walk from strategy k on
     for (uint32_t k = s - 1; n - k <= pass.eye_path_length + 1 && ratio > 0; --k, --freed) {
         if (k == 0) {  // y_0 has no slot: `freed` must not be looked at

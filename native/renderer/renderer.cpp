@@ -59,8 +59,9 @@ uint32_t Renderer::iterate(uint32_t count) {
 
 void Renderer::set_deadline(double seconds) {
     using Clock = std::chrono::steady_clock;
-    deadline_ = seconds > 0 ? Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds))
-                            : Clock::time_point::max();
+    deadline_ = seconds > 0
+                    ? Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds))
+                    : Clock::time_point::max();
 }
 
 float Renderer::progress() const {

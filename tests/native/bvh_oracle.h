@@ -20,9 +20,7 @@ inline Double3 cross(Double3 a, Double3 b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 inline Double3 transform(const Affine& a, Double3 p, double w) {
-    const auto row = [&](int i) {
-        return a.m[i][0] * p.x + a.m[i][1] * p.y + a.m[i][2] * p.z + a.m[i][3] * w;
-    };
+    const auto row = [&](int i) { return a.m[i][0] * p.x + a.m[i][1] * p.y + a.m[i][2] * p.z + a.m[i][3] * w; };
     return {row(0), row(1), row(2)};
 }
 
@@ -86,7 +84,8 @@ void for_each_exact_hit(const RayScene& scene, const Ray& ray, double slack, con
             const Double3 origin = solve(o - Double3{m.m[0][3], m.m[1][3], m.m[2][3]}), direction = solve(d);
             const Sphere& sphere = geometry.spheres[j];
             double roots[2];
-            if (!exact_sphere(origin, direction, to_double(sphere.center), sphere.radius * (1 + slack), roots, hit.margin)) {
+            if (!exact_sphere(origin, direction, to_double(sphere.center), sphere.radius * (1 + slack), roots,
+                              hit.margin)) {
                 continue;
             }
             for (const double t : roots) {

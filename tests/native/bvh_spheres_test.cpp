@@ -13,7 +13,8 @@ TEST(BvhSpheres, AgreeWithDoublePrecision) {
         std::uniform_real_distribution<float> uniform(0, 1);
         RayScene scene;
         std::vector<Sphere> spheres;
-        for (int i = 0; i < 200; ++i) spheres.push_back({random_point(random, 1), 0.2f * uniform(random) * uniform(random)});
+        for (int i = 0; i < 200; ++i)
+            spheres.push_back({random_point(random, 1), 0.2f * uniform(random) * uniform(random)});
         const uint32_t set = scene.add(spheres);
         scene.place(set);
         if (seed > 1) {
@@ -54,7 +55,8 @@ TEST(BvhSpheres, TinyHugeAndFar) {
     struct Case {
         float radius, distance, tolerance;  // of t, relative to the radius and to rounding of the distance
     };
-    for (const Case c : {Case{1e-6f, 1, 0}, Case{1e6f, 2e6f, 0}, Case{1, 1e6f, 0}, Case{1e-3f, 100, 0}, Case{1e5f, 1, 0}}) {
+    for (const Case c :
+         {Case{1e-6f, 1, 0}, Case{1e6f, 2e6f, 0}, Case{1, 1e6f, 0}, Case{1e-3f, 100, 0}, Case{1e5f, 1, 0}}) {
         std::mt19937 random(5);
         for (int i = 0; i < 200; ++i) {
             const Vec3 direction = random_direction(random);

@@ -12,9 +12,14 @@ namespace {
 Ray random_ray(std::mt19937& random, float size) {
     Ray ray{random_point(random, size), random_direction(random)};
     switch (random() % 4) {
-        case 0: ray.direction = {random() % 2 ? 1.0f : -1.0f, 0, 0}; break;
-        case 1: ray.direction = normalize(random_point(random, 0.3f * size) - ray.origin); break;
-        default: break;
+        case 0:
+            ray.direction = {random() % 2 ? 1.0f : -1.0f, 0, 0};
+            break;
+        case 1:
+            ray.direction = normalize(random_point(random, 0.3f * size) - ray.origin);
+            break;
+        default:
+            break;
     }
     if (random() % 8 == 0) {
         const float d = ray.direction.x;

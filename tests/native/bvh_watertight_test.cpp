@@ -6,7 +6,6 @@
 namespace vlp::test {
 namespace {
 
-
 // Aims at vertices, at points on edges and at random; every ray must hit.
 void expect_no_leak(const Mesh& mesh, const RayScene& scene, Vec3 center, float inner, int rays, uint32_t seed) {
     std::mt19937 random(seed);

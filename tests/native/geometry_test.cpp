@@ -152,7 +152,8 @@ TEST(Surface, PositionsAreOnTheTriangle) {
         const SurfacePoint point = surface_at(scene.view(), aimed, hit);
         const Triangle& triangle = mesh.triangles[hit.primitive];
         const Double3 a = to_double(mesh.positions[triangle.v[0]]);
-        const Double3 n = cross(to_double(mesh.positions[triangle.v[1]]) - a, to_double(mesh.positions[triangle.v[2]]) - a);
+        const Double3 n =
+            cross(to_double(mesh.positions[triangle.v[1]]) - a, to_double(mesh.positions[triangle.v[2]]) - a);
         // Within a few units in the last place of the coordinates, although the ray's origin is a thousand away.
         EXPECT_LT(std::fabs(dot(to_double(point.position) - a, n)) / std::sqrt(dot(n, n)), 5e-7);
         EXPECT_LT(length(point.position - (aimed.origin + aimed.direction * hit.t)), 2e-3f);
@@ -189,7 +190,8 @@ TEST(Surface, Ellipsoids) {
 TEST(Surface, MaterialSlots) {
     RayScene scene;
     Mesh mesh;
-    for (int i = 0; i < 3; ++i) mesh.add({0, 0, static_cast<float>(i)}, {1, 0, static_cast<float>(i)}, {0, 1, static_cast<float>(i)});
+    for (int i = 0; i < 3; ++i)
+        mesh.add({0, 0, static_cast<float>(i)}, {1, 0, static_cast<float>(i)}, {0, 1, static_cast<float>(i)});
     scene.place(scene.add(mesh));
     const std::vector<uint16_t> slots{1, 0, 9};
     const std::vector<uint32_t> materials{70, 71, 72, 73};
