@@ -3,6 +3,7 @@
 
 #include "light/area.h"
 #include "light/environment.h"
+#include "light/lamp_tree.h"
 #include "light/mesh.h"
 #include "light/point.h"
 #include "light/spot.h"
@@ -148,8 +149,7 @@ VLP_HD inline float pdf_next_event(const SceneView&, const Light& light, Vec3 re
 // lamp. Lamps neither block nor reflect.
 template <typename F>
 VLP_HD inline void for_each_lamp_hit(const SceneView& scene, const Ray& ray, F&& f) {
-    for (uint32_t i = 0; i < scene.lamps.count; ++i) {
-        const uint32_t index = scene.lamps.lights[i];
+    for_each_lamp_near(scene.lamps, ray, [&](uint32_t index) {
         const Light& light = scene.lights[index];
         float t = 0;
         Vec3 normal = light.normal;
@@ -157,7 +157,7 @@ VLP_HD inline void for_each_lamp_hit(const SceneView& scene, const Ray& ray, F&&
                              ? area_intersect(light, ray, t)
                              : intersect_sphere_shape(light.position, light.radius, ray, t, normal);
         if (hit) f(index, t, ray.origin + t * ray.direction, normal);
-    }
+    });
 }
 
 // Calls f(light_index) for every infinite light that an escaping ray in `direction` sees: the environment and the suns

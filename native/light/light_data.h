@@ -26,10 +26,14 @@ struct Light {
     float spread_share = 1;  // area: of a Lambertian lamp's power, that the spread leaves
 };
 
+struct LampNode;
+
 // Lamps with a shape (radius or area), found by rays but not blocking them.
 struct LampView {
     const uint32_t* lights = nullptr;  // indices of such lamps
     uint32_t count = 0;
+    const LampNode* nodes = nullptr;  // see lamp_tree.h; null: a list
+    uint32_t root = 0;
 };
 
 }  // namespace vlp

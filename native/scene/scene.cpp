@@ -167,7 +167,7 @@ void Scene::build(unsigned threads) {
         lights_.back().visibility = k_visible_to_camera;
     }
     collect_emitters();
-    make_light_tables();
+    make_light_tables(pool);
 
     view_ = view_placed(in_place);
     view_.geometries = geometry_views_.data();  // the passes' own copy, which lives as long as the scene
@@ -177,7 +177,8 @@ void Scene::build(unsigned threads) {
     }
     info_.instances = instances_.size();
     info_.bvh_bytes = bvh_.bytes();
-    info_.light_bytes = bytes_of(lights_) + bytes_of(light_choice_) + bytes_of(light_of_primitive_);
+    info_.light_bytes =
+        bytes_of(lights_) + bytes_of(lamps_.nodes) + bytes_of(light_choice_) + bytes_of(light_of_primitive_);
     info_.material_bytes = bytes_of(materials_) + bytes_of(lobes_) + bytes_of(material_of_slot_) + bytes_of(instances_);
     info_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     built_ = true;
@@ -197,7 +198,8 @@ SceneView Scene::view_placed(const Place& place) const {
     v.light_choice = {placed(light_choice_, place), static_cast<uint32_t>(light_choice_.size())};
     v.infinite_lights = placed(infinite_lights_, place);
     v.infinite_light_count = static_cast<uint32_t>(infinite_lights_.size());
-    v.lamps = {placed(lamps_, place), static_cast<uint32_t>(lamps_.size())};
+    v.lamps = {placed(lamps_.lights, place), static_cast<uint32_t>(lamps_.lights.size()),
+               lamps_.nodes.empty() ? nullptr : placed(lamps_.nodes, place), lamps_.root};
     v.albedo_tables = placed(albedo_tables(), place);
     v.bvh = {placed(bvh_.nodes, place), placed(bvh_.triangle_blocks, place), placed(bvh_.sphere_blocks, place),
              placed(bvh_.instance_roots, place), bvh_.root};
@@ -269,15 +271,17 @@ void Scene::add_emitters_of(uint32_t index) {
     }
 }
 
-void Scene::make_light_tables() {
+void Scene::make_light_tables(ThreadPool& pool) {
     std::vector<double> powers;
     for (const Light& light : lights_) powers.push_back(static_cast<double>(power(light, radius_)));
     light_choice_ = make_distribution(powers);
+    std::vector<uint32_t> shapes;
     for (uint32_t i = 0; i < lights_.size(); ++i) {
         const Light& light = lights_[i];
         if (is_delta(light) || light.instance != k_none) continue;
-        (is_infinite(light) ? infinite_lights_ : lamps_).push_back(i);
+        (is_infinite(light) ? infinite_lights_ : shapes).push_back(i);
     }
+    lamps_ = build_lamp_tree(lights_, std::move(shapes), pool);
 }
 
 }  // namespace vlp

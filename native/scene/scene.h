@@ -8,6 +8,7 @@
 #include "bvh/build.h"
 #include "core/parallel.h"
 #include "film/film.h"
+#include "light/lamp_tree_build.h"
 #include "scene/material_build.h"
 #include "scene/scene_view.h"
 
@@ -66,15 +67,16 @@ private:
     void require_open() const;
     void bound();
     void collect_emitters();
-    void make_light_tables();
+    void make_light_tables(ThreadPool& pool);
     void add_emitters_of(uint32_t instance);
 
     std::vector<Geometry> geometries_;
     std::vector<InstanceView> instances_;
     std::vector<Material> materials_;
     std::vector<Lobe> lobes_;
-    std::vector<uint32_t> material_of_slot_, light_of_primitive_, light_choice_, lamps_, infinite_lights_;
+    std::vector<uint32_t> material_of_slot_, light_of_primitive_, light_choice_, infinite_lights_;
     std::vector<Light> lights_;
+    LampTree lamps_;
     std::vector<GeometryView> geometry_views_;
     Rgb world_;
     Vec3 center_;
