@@ -197,6 +197,13 @@ void bind_scene(nb::module_& m) {
                                  visibility);
              })
         .def("set_world", [](Scene& s, Triple radiance) { s.set_world(rgb_of(radiance)); })
+        .def("set_world_image",
+             [](Scene& s, Array<const float, -1, -1, 3> texels, Array<const float, 3, 3> to_image) {
+                 const std::span<const Vec3> r = span_of<Vec3>(to_image);
+                 const Vec3 rows[3] = {r[0], r[1], r[2]};
+                 s.set_world_image(span_of<Rgb>(texels), static_cast<uint32_t>(texels.shape(1)),
+                                   static_cast<uint32_t>(texels.shape(0)), rows);
+             })
         .def("set_camera",
              [](Scene& s, FloatMatrix transform, int projection, float half_width, float half_height, float shift_x,
                 float shift_y, float clip_start, float clip_end, float aperture_radius, float focus_distance) {

@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "film/film.h"
 #include "light/lamp_tree_build.h"
+#include "light/light_build.h"
 #include "scene/material_build.h"
 #include "scene/scene_view.h"
 
@@ -29,6 +30,9 @@ public:
                       uint32_t visibility);
     void add_lamp(Light light, uint32_t visibility);
     void set_world(Rgb radiance) { world_ = radiance; }
+    // Instead of a constant: an equirectangular picture, `height` rows of `width` texels, row 0 at the pole below, and the
+    // rotation from the world to it.
+    void set_world_image(std::span<const Rgb> texels, uint32_t width, uint32_t height, const Vec3 (&to_image)[3]);
     void set_camera(const Camera& camera);  // all but the resolution, which set_film sets
     void set_film(uint32_t width, uint32_t height, Window window, bool transparent);
 
@@ -79,6 +83,9 @@ private:
     LampTree lamps_;
     std::vector<GeometryView> geometry_views_;
     Rgb world_;
+    std::vector<Rgb> world_texels_;
+    EnvironmentTables world_tables_;
+    EnvironmentView world_view_;  // without arrays
     Vec3 center_;
     float radius_ = 1;
     Camera camera_;

@@ -67,6 +67,11 @@ class Scene:
         visibility: int,
     ) -> bool: ...
     def set_world(self, radiance: _Triple) -> None: ...
+    def set_world_image(
+        self,
+        texels: _Float32,  # (height, width, 3), row 0 at the pole below
+        to_image: _Float32,  # (3, 3): rotation from the world to the picture
+    ) -> None: ...
     def set_camera(
         self,
         transform: _Float32,

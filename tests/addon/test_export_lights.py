@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -10,7 +11,7 @@ import bpy_scenes as scenes
 import numpy as np
 import pytest
 
-from addon.export.notes import Notes
+from addon.export.notes import ExportError, Notes
 from vlp_bpt.scene import AreaLight, PointLight, SpotLight, SunLight
 
 
@@ -176,6 +177,68 @@ def test_no_world_is_black() -> None:
 def test_a_world_without_surface_is_black() -> None:
     world().node_tree.links.clear()
     assert scenes.export().world.radiance == (0, 0, 0)
+
+
+def environment(made: Any) -> Any:
+    """An Environment Texture that feeds the world's Background, of an image of 8 x 4 linear pixels."""
+    tree = made.node_tree
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    background = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBackground")
+    tree.links.new(node.outputs[0], scenes.socket(background, "Color"))
+    node.image = bpy.data.images.new("sky", 8, 4, float_buffer=True)
+    pixels = np.random.default_rng(1).random((4, 8, 4)).astype(np.float32)
+    node.image.pixels.foreach_set(pixels.ravel())
+    return node, pixels
+
+
+def test_a_world_image() -> None:
+    _, pixels = environment(world(Strength=2))
+    notes = Notes()
+    found = scenes.export(notes).world
+    assert notes.warnings == []
+    assert found.radiance == (2, 2, 2)
+    assert found.image == pytest.approx(pixels[..., :3] * pixels[..., 3:])
+    assert (found.rotation == np.eye(3)).all()
+
+
+@pytest.mark.parametrize("kind", ["POINT", "TEXTURE", "VECTOR", "NORMAL"])
+def test_a_mapping_turns_the_world_image(kind: str) -> None:
+    made = world()
+    node, _ = environment(made)
+    mapping = made.node_tree.nodes.new("ShaderNodeMapping")
+    mapping.vector_type = kind
+    scenes.socket(mapping, "Rotation").default_value = (0, 0, math.pi / 2)
+    coordinates = made.node_tree.nodes.new("ShaderNodeTexCoord")
+    generated = next(socket for socket in coordinates.outputs if socket.identifier == "Generated")
+    made.node_tree.links.new(generated, scenes.socket(mapping, "Vector"))
+    made.node_tree.links.new(mapping.outputs[0], scenes.socket(node, "Vector"))
+    notes = Notes()
+    turned = scenes.export(notes).world.rotation @ (1, 0, 0)
+    assert notes.warnings == []
+    assert turned == pytest.approx((0, -1, 0) if kind == "TEXTURE" else (0, 1, 0), abs=1e-6)
+
+
+def test_a_world_image_in_bytes_is_made_linear() -> None:
+    node, _ = environment(world())
+    node.image = bpy.data.images.new("bytes", 2, 1)
+    node.image.pixels.foreach_set(np.array([0, 0.5, 1, 1, 0.02, 0.2, 0.8, 1], np.float32))
+    found = scenes.export().world.image
+    assert found[0, 0] == pytest.approx((0, 0.2140, 1), abs=2e-3)
+    assert found[0, 1] == pytest.approx((0.0016, 0.0331, 0.6038), abs=2e-3)
+
+
+def test_an_absent_world_image_is_named(tmp_path: Path) -> None:
+    node, _ = environment(world())
+    node.image = bpy.data.images.new("gone", 8, 4)
+    node.image.source, node.image.filepath = "FILE", str(tmp_path / "gone.hdr")
+    with pytest.raises(ExportError, match=r"World 'World'.*image 'gone'.*gone\.hdr"):
+        scenes.export()
+
+
+def test_a_world_without_its_image_is_magenta() -> None:
+    node, _ = environment(world())
+    node.image = None
+    assert scenes.export().world.image.tolist() == [[[1, 0, 1]]]
 
 
 def test_a_textured_world_is_reported_once() -> None:
