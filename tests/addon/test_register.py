@@ -82,6 +82,21 @@ def test_each_setting_is_exported() -> None:
     assert {name: getattr(settings, name) for name in values} == values
 
 
+def test_every_value_that_a_setting_can_have_in_blender_is_valid() -> None:
+    shown = bpy.context.scene.vlp_bpt
+    for name in RANGES:
+        definition = shown.bl_rna.properties[name]
+        for value in (definition.hard_min, definition.hard_max):
+            setattr(shown, name, value)
+            export_settings(bpy.context.scene).validate()
+        shown.property_unset(name)
+
+
+def test_numbers_are_exported_as_typed() -> None:
+    bpy.context.scene.vlp_bpt.filter_width = 1.7
+    assert export_settings(bpy.context.scene).filter_width == 1.7
+
+
 def test_blenders_own_thread_count_is_heard() -> None:
     scene = bpy.context.scene
     scene.render.threads_mode, scene.render.threads = "FIXED", 3
