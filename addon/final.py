@@ -21,6 +21,9 @@ from . import core, figures
 SHARE_OF_SHOWING = 0.1
 LEAST_SECONDS_BETWEEN_PICTURES = 0.25
 
+# Without a window Blender prints every status line: a few are enough to see that it goes on.
+SECONDS_BETWEEN_PRINTED_LINES = 5.0
+
 # Warnings already reported in this picture or animation.
 _reported: set[str] = set()
 
@@ -164,11 +167,15 @@ class _Watcher:
         self._engine, self._renderer, self._picture = engine, renderer, picture
         self._layer, self._layers = _place_of_layer(depsgraph)
         self._warnings = f" | {warnings} warning{'s' if warnings > 1 else ''}" if warnings else ""
+        self._pause = SECONDS_BETWEEN_PRINTED_LINES if bpy.app.background else 0.0
+        self._told = float("-inf")
 
     def __call__(self, progress: Any) -> None:
         taken = self._renderer.statistics
         self._engine.update_progress((self._layer + progress.fraction) / self._layers)
-        self._engine.update_stats("", figures.status(taken, progress) + self._warnings)
+        if progress.fraction >= 1 or time.perf_counter() - self._told >= self._pause:
+            self._told = time.perf_counter()
+            self._engine.update_stats("", figures.status(taken, progress) + self._warnings)
         megabytes = taken.memory_bytes / 2**20
         self._engine.update_memory_stats(memory_used=megabytes, memory_peak=megabytes)
         if progress.picture and self._picture.due():

@@ -250,6 +250,17 @@ def test_the_status_line_says_how_it_goes(out: Path, watch: Watch) -> None:
     assert watch.lines[-1] == ("Iteration 2/2 | 0.00 Mpaths/s | 42 VLPs | Mem 1.0 MB | 0:00:02 left | 1 warning")
 
 
+def test_without_a_window_the_console_is_not_flooded(out: Path, watch: Watch, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenes.camera()
+    bpy.context.scene.vlp_bpt.samples = 40
+    monkeypatch.setattr(FakeRenderer, "seconds_per_iteration", 0.05)
+    monkeypatch.setattr(final, "SECONDS_BETWEEN_PRINTED_LINES", 0.5)
+    render()
+    lines = [line for line in watch.lines if line.startswith("Iteration")]
+    assert 3 <= len(lines) <= 6
+    assert lines[-1].startswith("Iteration 40/40")
+
+
 def test_esc_keeps_the_picture_so_far(
     out: Path, fake: list[FakeRenderer], watch: Watch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
