@@ -138,7 +138,7 @@ def _combine(graph: Graph, place: Place) -> Value | None:
 
 
 def _image(graph: Graph, place: Place) -> Value | None:
-    """The mean of an image: what stands in for a texture that is not looked up."""
+    """The mean of an image: what stands in for a texture that is not looked up. An environment's is over directions."""
     image = place.node.image
     if image is None:
         graph.notes.warn(f"{graph.owner}: {place.node.bl_label} '{place.node.name}' has no image")
@@ -149,13 +149,17 @@ def _image(graph: Graph, place: Place) -> Value | None:
     graph.notes.warn(f"{graph.owner}: image '{image.name}' is not there yet, its mean colour stands in for it")
     buffer = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(buffer)
-    pixels = buffer.reshape(-1, image.channels)
+    pixels = buffer.reshape(image.size[1], -1, image.channels)
     if place.socket.identifier == "Alpha":
-        return float(pixels[:, 3].mean(dtype=np.float64)) if image.channels == 4 else 1.0
-    colors = pixels[:, :3] if image.channels >= 3 else np.repeat(pixels[:, :1], 3, axis=1)
+        return float(pixels[..., 3].mean(dtype=np.float64)) if image.channels == 4 else 1.0
+    colors = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     if not image.is_float and image.colorspace_settings.name == "sRGB":  # byte images hold encoded values
         colors = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
-    return _triple(float(mean) for mean in colors.mean(axis=0, dtype=np.float64))
+    weights = np.ones(len(colors))
+    if getattr(place.node, "projection", "") == "EQUIRECTANGULAR":  # rows are smaller towards the poles
+        weights = np.sin((np.arange(len(colors)) + 0.5) * np.pi / len(colors))
+    rows = colors.mean(axis=1, dtype=np.float64)
+    return _triple(float(mean) for mean in np.average(rows, axis=0, weights=weights))
 
 
 FOLDABLE: dict[str, Callable[[Graph, Place], Value | None]] = {
@@ -171,4 +175,5 @@ FOLDABLE: dict[str, Callable[[Graph, Place], Value | None]] = {
     "ShaderNodeCombineXYZ": _combine,
     "ShaderNodeRGBToBW": lambda graph, place: as_number(_color(graph, place, "Color")),
     "ShaderNodeTexImage": _image,
+    "ShaderNodeTexEnvironment": _image,
 }

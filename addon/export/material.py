@@ -51,8 +51,7 @@ def _shader(graph: Graph, place: Place | None, depth: int) -> Material:
     if depth >= MAX_DEPTH:
         graph.notes.warn(f"{graph.owner}: more than {MAX_DEPTH} shader nodes below one another, the rest is left out")
         return Material()
-    normal = place.input("Normal")
-    if normal is not None and graph.source(normal) is not None:
+    if graph.input_source(place, "Normal") is not None:
         graph.notes.warn(f"{graph.owner}: bump and normal maps are not there yet")
     read = _SHADERS.get(place.node.bl_idname)
     if read is None:
@@ -154,8 +153,7 @@ def _principled(graph: Graph, place: Place, depth: int) -> Material:
 
 
 def _input_shader(graph: Graph, place: Place, identifier: str, depth: int) -> Material:
-    socket = place.input(identifier)
-    return _shader(graph, None if socket is None else graph.source(socket), depth + 1)
+    return _shader(graph, graph.input_source(place, identifier), depth + 1)
 
 
 def _color(graph: Graph, place: Place, identifier: str) -> Any:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from vlp_bpt.scene import World
 
-from .nodes import Graph, label
+from .nodes import Graph, Place, label
 from .notes import Notes
 
 
@@ -21,14 +23,25 @@ def export_world(world: Any, notes: Notes) -> World:
     graph = Graph(world, "World", notes)
     if graph.output("Volume") is not None:
         notes.warn(f"{graph.owner}: volumes are not there yet")
-    place = graph.output("Surface")
+    radiance = _radiance(graph, graph.output("Surface"))
+    if (radiance < 0).any():
+        notes.warn(f"{graph.owner}: negative light is not there yet, taken as zero")
+    red, green, blue = (float(channel) for channel in np.maximum(radiance, 0.0))
+    return World(world.name, (red, green, blue))
+
+
+def _radiance(graph: Graph, place: Place | None) -> NDArray[np.float64]:
+    """(3,) what the shader at an output sends from every direction; black where there is none."""
     if place is None:
-        return World(world.name)
+        return np.zeros(3)
     if place.socket.type != "SHADER":
-        color, strength = graph.color(place), 1.0
-    elif place.node.bl_idname in ("ShaderNodeBackground", "ShaderNodeEmission"):
-        color, strength = graph.color(place.input("Color")), graph.number(place.input("Strength"))
-    else:
-        notes.warn(f"{graph.owner}: {label(place.node)} is not there yet, the world stays black")
-        return World(world.name)
-    return World(world.name, tuple(max(channel * strength, 0.0) for channel in color))  # type: ignore[arg-type]
+        return np.array(graph.color(place))
+    kind = place.node.bl_idname
+    if kind in ("ShaderNodeBackground", "ShaderNodeEmission"):
+        return np.array(graph.color(place.input("Color"))) * graph.number(place.input("Strength"))
+    if kind in ("ShaderNodeAddShader", "ShaderNodeMixShader"):
+        first, second = (_radiance(graph, graph.input_source(place, name)) for name in ("Shader", "Shader_001"))
+        factor = min(max(graph.number(place.input("Fac")), 0.0), 1.0)
+        return first + second if kind == "ShaderNodeAddShader" else (1.0 - factor) * first + factor * second
+    graph.notes.warn(f"{graph.owner}: {label(place.node)} is not there yet, black stands in for it")
+    return np.zeros(3)

@@ -129,6 +129,23 @@ def test_a_lamp_scaled_to_nothing_is_left_out() -> None:
     assert len(notes.warnings) == 1
 
 
+@pytest.mark.parametrize("kind", ["SPOT", "SUN"])
+def test_a_lamp_without_direction_is_left_out_and_named(kind: str) -> None:
+    scenes.light(kind).scale = (0, 0, 0)
+    notes = Notes()
+    assert scenes.export(notes).lights == []
+    (warning,) = notes.warnings
+    assert f"'{kind.title()}'" in warning
+
+
+def test_a_spread_of_zero_is_next_to_parallel() -> None:
+    scenes.light("AREA", energy=1, spread=0)
+    exported = scenes.export()
+    exported.validate()
+    (light,) = exported.lights
+    assert 0 < light.spread < 0.01
+
+
 def test_lamps_without_power_are_left_out() -> None:
     scenes.light("POINT", energy=0)
     notes = Notes()
@@ -157,10 +174,13 @@ def world(**values: Any) -> Any:
     made = bpy.data.worlds.new("World")
     made.use_nodes = True
     bpy.context.scene.world = made
-    node = next(node for node in made.node_tree.nodes if node.bl_idname == "ShaderNodeBackground")
     for name, value in values.items():
-        scenes.socket(node, name).default_value = value
+        scenes.socket(background(made), name).default_value = value
     return made
+
+
+def background(made: Any) -> Any:
+    return next(node for node in made.node_tree.nodes if node.bl_idname == "ShaderNodeBackground")
 
 
 def test_world_colour_and_strength() -> None:
@@ -178,12 +198,65 @@ def test_a_world_without_surface_is_black() -> None:
     assert scenes.export().world.radiance == (0, 0, 0)
 
 
+@pytest.mark.parametrize("factor", [None, 0.25])
+def test_worlds_are_added_and_mixed(factor: float | None) -> None:
+    made = world(Color=(0.4, 0.2, 0.0, 1), Strength=2)
+    tree = made.node_tree
+    other = tree.nodes.new("ShaderNodeBackground")
+    scenes.socket(other, "Color").default_value = (0, 0, 1, 1)
+    both = tree.nodes.new("ShaderNodeAddShader" if factor is None else "ShaderNodeMixShader")
+    if factor is not None:
+        scenes.socket(both, "Fac").default_value = factor
+    tree.links.new(background(made).outputs[0], scenes.socket(both, "Shader"))
+    tree.links.new(other.outputs[0], scenes.socket(both, "Shader_001"))
+    tree.links.new(both.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    notes = Notes()
+    wanted = (0.8, 0.4, 1.0) if factor is None else (0.6, 0.3, 0.25)
+    assert scenes.export(notes).world.radiance == pytest.approx(wanted)
+    assert notes.warnings == []
+
+
+def test_negative_light_of_the_world_is_named() -> None:
+    world(Color=(1, 1, 1, 1), Strength=-1)
+    notes = Notes()
+    assert scenes.export(notes).world.radiance == (0, 0, 0)
+    assert "World 'World'" in notes.warnings[0] and "negative" in notes.warnings[0]
+
+
+def environment(image: Any) -> Any:
+    made = world()
+    texture = made.node_tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image
+    made.node_tree.links.new(texture.outputs[0], scenes.socket(background(made), "Color"))
+    return made
+
+
+def test_an_environment_image_is_its_mean_over_directions() -> None:
+    """White above a height of 30 degrees, which is a quarter of the directions but a third of the rows."""
+    image = bpy.data.images.new("sky", 4, 90, float_buffer=True)
+    pixels = np.zeros((90, 4, 4), np.float32)
+    pixels[60:] = 1
+    image.pixels.foreach_set(pixels.ravel())
+    environment(image)
+    notes = Notes()
+    assert scenes.export(notes).world.radiance == pytest.approx([0.25] * 3, rel=1e-3)
+    assert "'sky'" in notes.warnings[0]
+
+
+def test_a_missing_environment_image_is_named_with_its_file() -> None:
+    image = bpy.data.images.new("gone.hdr", 4, 4)
+    image.source, image.filepath = "FILE", "/nowhere/gone.hdr"
+    environment(image)
+    notes = Notes()
+    scenes.export(notes)
+    assert "World 'World'" in notes.warnings[0] and "/nowhere/gone.hdr" in notes.warnings[0]
+
+
 def test_a_textured_world_is_reported_once() -> None:
     made = world(Color=(0.5, 0.5, 0.5, 1))
-    node = next(node for node in made.node_tree.nodes if node.bl_idname == "ShaderNodeBackground")
     sky = made.node_tree.nodes.new("ShaderNodeTexSky")
-    made.node_tree.links.new(sky.outputs[0], scenes.socket(node, "Color"))
+    made.node_tree.links.new(sky.outputs[0], scenes.socket(background(made), "Color"))
     notes = Notes()
     assert scenes.export(notes).world.radiance == pytest.approx((0.5, 0.5, 0.5))
     assert len(notes.warnings) == 1
-    assert "Sky Texture" in notes.warnings[0] and "World 'World'" in notes.warnings[0]
+    assert notes.warnings[0].startswith("World 'World': node Sky Texture is not there yet")

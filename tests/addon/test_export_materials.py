@@ -317,7 +317,7 @@ def test_what_is_not_there_yet_stands_in_and_is_reported_once() -> None:
     (found,) = scenes.export(notes).materials
     wanted = materials.add(materials.principled(RED, roughness=0.3), materials.diffuse(RED))
     assert_same(found, replace(wanted, name="m"))
-    for words in ("Noise Texture", "Toon BSDF", "coat"):
+    for words in ("node Noise Texture is", "node Toon BSDF is", "node Principled BSDF: coat"):
         assert sum(words in text for text in notes.warnings) == 1, notes.warnings
     assert len(notes.warnings) == 3
 
