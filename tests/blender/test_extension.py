@@ -97,21 +97,8 @@ def test_the_picture_is_the_one_made_through_bpy(
     """
     suffix = {"PNG": ".png", "OPEN_EXR": ".exr"}[file_format]
     module = tmp_path / f"module{suffix}"
-    command = [
-        sys.executable,
-        "-m",
-        "vlp_bpt",
-        "render",
-        SCENE,
-        "-o",
-        module,
-        "--samples",
-        "2",
-        "--frame",
-        "1",
-        "--quiet",
-    ]
-    subprocess.run(command, cwd=ROOT, check=True, timeout=400)
+    options = f"render {SCENE} -o {module} --samples 2 --frame 1 --quiet".split()
+    subprocess.run([sys.executable, "-m", "vlp_bpt", *options], cwd=ROOT, check=True, timeout=400)
     expression = (
         "import bpy; scene = bpy.context.scene; scene.vlp_bpt.samples = 2; image = scene.render.image_settings; "
         f"image.file_format, image.color_depth, image.color_mode = '{file_format}', '{depth}', 'RGB'"
