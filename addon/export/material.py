@@ -165,9 +165,12 @@ def _number(graph: Graph, place: Place, identifier: str) -> float:
 
 
 def _distribution(graph: Graph, place: Place) -> materials.Distribution:
-    """GGX with or without its lost energy; GGX too where the node asks for a distribution that is not there yet."""
+    """GGX with or without its lost energy; GGX too where the node asks for a distribution that is not there yet.
+
+    A smooth surface has none: what it asks for, such as the Beckmann of a new Refraction node, makes no difference.
+    """
     chosen = place.node.distribution
-    if chosen not in ("GGX", "MULTI_GGX"):
+    if chosen not in ("GGX", "MULTI_GGX") and _number(graph, place, "Roughness") > 0:
         graph.notes.warn(f"{graph.owner}: {label(place.node)}: {chosen.title()} is not there yet, GGX stands in for it")
     return "MULTI_GGX" if chosen == "MULTI_GGX" else "GGX"
 

@@ -82,6 +82,17 @@ def test_refraction() -> None:
     check(made, materials.refraction(RED, 0.1, 1.33))
 
 
+@pytest.mark.parametrize("roughness", [0.0, 0.3])
+def test_the_distribution_of_a_new_refraction_node_matters_only_when_it_is_rough(roughness: float) -> None:
+    made, (node,) = scenes.material("m", "ShaderNodeBsdfRefraction")
+    node.distribution = "BECKMANN"
+    put(node, Roughness=roughness)
+    notes = Notes()
+    exported(made, notes)
+    assert [warning for warning in notes.warnings if "Beckmann" in warning] == notes.warnings
+    assert len(notes.warnings) == (1 if roughness else 0)
+
+
 def test_transparent_and_translucent() -> None:
     for kind, make in (("Transparent", materials.transparent), ("Translucent", materials.translucent)):
         bpy.ops.wm.read_factory_settings(use_empty=True)
