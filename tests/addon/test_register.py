@@ -120,13 +120,13 @@ def test_panels_of_blender_that_fit_are_shown() -> None:
         "WORLD_PT_context_world",
     }
     assert wanted <= names
-    assert not {"DATA_PT_light", "MATERIAL_PT_preview", "VIEWLAYER_PT_layer_passes"} & names
+    assert not {"DATA_PT_light", "RENDER_PT_simplify", "MATERIAL_PT_preview", "VIEWLAYER_PT_layer_passes"} & names
     assert not {name for name in names if name.startswith(("CYCLES", "RENDER_PT_eevee"))}
 
 
 def test_panels_of_this_addon_are_for_this_engine_alone() -> None:
     own = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("VLP_BPT_PT")]
-    assert len(own) == 7
+    assert len(own) == 8
     assert all({"VLP_BPT"} == panel.COMPAT_ENGINES for panel in own)
 
 
