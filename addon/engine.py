@@ -34,4 +34,5 @@ def register() -> None:
 
 
 def unregister() -> None:
+    final.stop_all()
     bpy.utils.unregister_class(VLP_BPT_RenderEngine)

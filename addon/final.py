@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import threading
 import time
 import traceback
 from typing import Any
@@ -21,14 +22,22 @@ from . import core, figures
 SHARE_OF_SHOWING = 0.1
 LEAST_SECONDS_BETWEEN_PICTURES = 0.25
 
+# Without a window Blender prints every status line: a few are enough to see that it goes on.
+SECONDS_BETWEEN_PRINTED_LINES = 5.0
+
 # Warnings already reported in this picture or animation.
 _reported: set[str] = set()
+
+# Engines that render at this moment, and whether they are to stop.
+_running: list[Any] = []
+_stop = threading.Event()
 
 
 def render(engine: Any, depsgraph: Any) -> None:
     """Renders one view layer into Blender's result, and reports what went wrong or was left out."""
     started = time.perf_counter()
     picture = None
+    _running.append(engine)
     try:
         picture = Picture(engine, depsgraph)
         _render(engine, depsgraph, picture, started)
@@ -36,7 +45,23 @@ def render(engine: Any, depsgraph: Any) -> None:
         engine.report({"ERROR"}, explain(error))
     finally:
         if picture is not None:
-            picture.end(engine.test_break())
+            picture.end(_Break(engine).is_set())
+        _running.remove(engine)
+
+
+def stop_all(most_seconds: float = 5.0) -> None:
+    """Ends what renders on other threads and keeps its picture, before the engine's class goes.
+
+    Blender goes on with an engine whose class is gone, and crashes.
+    """
+    if not _running:
+        return
+    _stop.set()
+    ends = time.monotonic() + most_seconds
+    while _running and time.monotonic() < ends:
+        time.sleep(0.01)
+    time.sleep(0.2)  # Blender's own last steps with the engine
+    _stop.clear()
 
 
 def explain(error: Exception) -> str:
@@ -65,7 +90,7 @@ def _render(engine: Any, depsgraph: Any, picture: Picture, started: float) -> No
     )
     if picture.views > 1:
         notes.warn("Stereoscopy is not there yet: every view gets the same picture")
-    if engine.test_break():
+    if _Break(engine).is_set():
         return
     engine.update_stats("", "Building the scene")
     renderer = vlp_bpt.Renderer(scene, settings)
@@ -148,13 +173,13 @@ def window(settings: Any, full: tuple[int, int], size: tuple[int, int]) -> tuple
 
 
 class _Break:
-    """Esc, as a flag that the renderer asks about."""
+    """Esc or `stop_all`, as a flag that the renderer asks about."""
 
     def __init__(self, engine: Any) -> None:
         self._engine = engine
 
     def is_set(self) -> bool:
-        return bool(self._engine.test_break())
+        return _stop.is_set() or bool(self._engine.test_break())
 
 
 class _Watcher:
@@ -164,11 +189,15 @@ class _Watcher:
         self._engine, self._renderer, self._picture = engine, renderer, picture
         self._layer, self._layers = _place_of_layer(depsgraph)
         self._warnings = f" | {warnings} warning{'s' if warnings > 1 else ''}" if warnings else ""
+        self._pause = SECONDS_BETWEEN_PRINTED_LINES if bpy.app.background else 0.0
+        self._told = float("-inf")
 
     def __call__(self, progress: Any) -> None:
         taken = self._renderer.statistics
         self._engine.update_progress((self._layer + progress.fraction) / self._layers)
-        self._engine.update_stats("", figures.status(taken, progress) + self._warnings)
+        if progress.fraction >= 1 or time.perf_counter() - self._told >= self._pause:
+            self._told = time.perf_counter()
+            self._engine.update_stats("", figures.status(taken, progress) + self._warnings)
         megabytes = taken.memory_bytes / 2**20
         self._engine.update_memory_stats(memory_used=megabytes, memory_peak=megabytes)
         if progress.picture and self._picture.due():

@@ -11,6 +11,8 @@ from vlp_bpt.scene import Camera, Float32, Projection
 
 from .notes import ExportError, Notes
 
+LEAST_FOCUS_DISTANCE = 1e-5  # metres: what stands for zero, as in Cycles
+
 
 def export_camera(depsgraph: bpy.types.Depsgraph, width: int, height: int, notes: Notes) -> Camera:
     """The camera for a picture of width x height pixels, before any border is cut out of it.
@@ -64,13 +66,13 @@ def _depth_of_field(camera: Camera, camera_object: bpy.types.Object, notes: Note
 def _focus_distance(camera: Camera, dof: Any) -> float:
     target = dof.focus_object
     if target is None:
-        return float(dof.focus_distance)
+        return max(float(dof.focus_distance), LEAST_FOCUS_DISTANCE)
     matrix = target.matrix_world
     if target.type == "ARMATURE" and dof.focus_subtarget:
         bone = target.pose.bones.get(dof.focus_subtarget)
         matrix = matrix @ bone.matrix if bone else matrix
     offset = np.array(matrix.translation) - camera.transform[:, 3]
-    return max(abs(float(offset @ camera.transform[:, 2])), 1e-6)
+    return max(abs(float(offset @ camera.transform[:, 2])), LEAST_FOCUS_DISTANCE)
 
 
 def rigid(matrix: Any) -> Float32:

@@ -8,20 +8,22 @@ import numpy as np
 
 from vlp_bpt.scene import Float32
 
-from .notes import ExportError, Notes
+from .notes import Notes
 
+MISSING = (1.0, 0.0, 1.0)  # Blender's sign for an image that cannot be read
 LINEAR = ("Linear Rec.709", "Linear", "Non-Color", "Raw", "scene_linear")
 
 
-def export_image(image: Any, owner: str, notes: Notes) -> Float32:
-    """(H, W, 3) linear colours, row 0 at the bottom. Raises ExportError for an image whose file is absent or damaged.
+def export_image(image: Any, owner: str, notes: Notes) -> Float32 | None:
+    """(H, W, 3) linear colours, row 0 at the bottom; None, with a warning, where its file is absent or damaged.
 
     Blender gives the pixels of float images as linear values of its working space, those of others as they are encoded.
     Colours are multiplied by an alpha that is kept apart from them, as Cycles does.
     """
     width, height = image.size  # reads the file
     if width == 0 or height == 0:
-        raise ExportError(f"{owner}: image '{image.name}' has no pixels: its file '{image.filepath}' cannot be read")
+        notes.warn(f"{owner}: image '{image.name}' cannot be read from '{image.filepath}'")
+        return None
     channels = image.channels
     pixels = np.empty(width * height * channels, np.float32)
     image.pixels.foreach_get(pixels)

@@ -14,6 +14,8 @@ from .camera import rigid
 from .nodes import Graph, label
 from .notes import Notes
 
+LEAST_SPREAD = math.radians(0.1)  # of an area light: what stands for zero, as good as parallel
+
 
 def export_light(lamp: bpy.types.Object, matrix: Float32, visibility: Visibility, notes: Notes) -> Light | None:
     """The lamp placed by `matrix` (3, 4), or None where it gives no light."""
@@ -35,6 +37,9 @@ def export_light(lamp: bpy.types.Object, matrix: Float32, visibility: Visibility
     if data.type == "AREA":
         return _area(name, data, matrix, strength, visibility, notes)
     transform = rigid(matrix)
+    if data.type != "POINT" and not transform[:, 2].any():
+        notes.warn(f"{owner}: scaled to nothing it has no direction, the light is left out")
+        return None
     if data.type == "SUN":
         return SunLight(name, transform, _sun_irradiance(data, strength), data.angle, visibility)
     radius = float(data.shadow_soft_size)
@@ -75,7 +80,7 @@ def _area(
         notes.warn(f"Light '{name}': its area is zero ({size[0]:g} x {size[1]:g} m, scaled), the light is left out")
         return None
     power = strength if data.normalize else _scaled(strength, area)
-    return AreaLight(name, matrix, power, size, ellipse, data.spread, visibility)
+    return AreaLight(name, matrix, power, size, ellipse, max(data.spread, LEAST_SPREAD), visibility)
 
 
 def _strength(data: Any, notes: Notes) -> Rgb:

@@ -51,8 +51,7 @@ def _shader(graph: Graph, place: Place | None, depth: int) -> Material:
     if depth >= MAX_DEPTH:
         graph.notes.warn(f"{graph.owner}: more than {MAX_DEPTH} shader nodes below one another, the rest is left out")
         return Material()
-    normal = place.input("Normal")
-    if normal is not None and graph.source(normal) is not None:
+    if graph.input_source(place, "Normal") is not None:
         graph.notes.warn(f"{graph.owner}: bump and normal maps are not there yet")
     read = _SHADERS.get(place.node.bl_idname)
     if read is None:
@@ -154,8 +153,7 @@ def _principled(graph: Graph, place: Place, depth: int) -> Material:
 
 
 def _input_shader(graph: Graph, place: Place, identifier: str, depth: int) -> Material:
-    socket = place.input(identifier)
-    return _shader(graph, None if socket is None else graph.source(socket), depth + 1)
+    return _shader(graph, graph.input_source(place, identifier), depth + 1)
 
 
 def _color(graph: Graph, place: Place, identifier: str) -> Any:
@@ -167,9 +165,12 @@ def _number(graph: Graph, place: Place, identifier: str) -> float:
 
 
 def _distribution(graph: Graph, place: Place) -> materials.Distribution:
-    """GGX with or without its lost energy; GGX too where the node asks for a distribution that is not there yet."""
+    """GGX with or without its lost energy; GGX too where the node asks for a distribution that is not there yet.
+
+    A smooth surface has none: what it asks for, such as the Beckmann of a new Refraction node, makes no difference.
+    """
     chosen = place.node.distribution
-    if chosen not in ("GGX", "MULTI_GGX"):
+    if chosen not in ("GGX", "MULTI_GGX") and _number(graph, place, "Roughness") > 0:
         graph.notes.warn(f"{graph.owner}: {label(place.node)}: {chosen.title()} is not there yet, GGX stands in for it")
     return "MULTI_GGX" if chosen == "MULTI_GGX" else "GGX"
 

@@ -6,6 +6,7 @@ Sockets are addressed by identifier: their names change between versions.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,6 +59,11 @@ class Graph:
         """The output socket that feeds an input, or None where it stands on its own value."""
         found = self._follow(place)
         return found if found.socket.is_output else None
+
+    def input_source(self, place: Place, identifier: str) -> Place | None:
+        """The output socket that feeds an input of this socket's node, or None."""
+        socket = place.input(identifier)
+        return None if socket is None else self.source(socket)
 
     def number(self, place: Place | None, default: float = 0.0) -> float:
         """The constant at an input as a number; `default` where the node has no such input."""
@@ -149,6 +155,9 @@ def own_value(socket: Any) -> Value:
 
 
 def label(node: Any) -> str:
-    """A node as the artist sees it: its type, and its name where that says more."""
-    kind = node.bl_label or node.bl_idname
-    return f"node {kind}" if node.name.split(".")[0] == kind else f"node {kind} ('{node.name}')"
+    """A node as the artist sees it: its type, and its name where that says more.
+
+    Blender puts a number before the names of nodes in an inlined tree.
+    """
+    kind, name = node.bl_label or node.bl_idname, re.sub(r"^\d+_", "", node.name)
+    return f"node {kind}" if name.split(".")[0] == kind else f"node {kind} ('{name}')"

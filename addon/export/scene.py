@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from vlp_bpt.scene import Film, Float32, Instance, Mesh, Scene, Spheres, Visibility
+from vlp_bpt.validation import is_singular
 
 from .camera import export_camera
 from .light import export_light
@@ -74,7 +75,8 @@ class _Objects:
     def add_all(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Adds every object and instance. None of them is kept: they die as the iteration goes on."""
         transforms = instance_transforms(depsgraph)
-        singular = is_singular(transforms)
+        # What is not a number is left in: an error that the scene's own check names.
+        singular = is_singular(transforms) & np.isfinite(transforms).all(axis=(1, 2))
         for index, instance in enumerate(depsgraph.object_instances):
             if not instance.show_self:
                 continue
@@ -102,8 +104,8 @@ class _Objects:
         if common is None:
             return
         if singular:
-            scale = tuple(round(float(length), 6) for length in np.linalg.norm(matrix[:, :3], axis=0))
-            self.notes.warn(f"Object '{common.name}': its scale {scale} flattens it to nothing, left out")
+            scale = ", ".join(f"{length:.6g}" for length in np.linalg.norm(matrix[:, :3].astype(float), axis=0))
+            self.notes.warn(f"Object '{common.name}': with a scale of ({scale}) it cannot be rendered, left out")
             return
         visibility = Visibility(0) if hidden else common.visibility
         self.scene.instances.append(Instance(common.name, common.geometry, matrix, common.materials, visibility))
@@ -165,14 +167,6 @@ def instance_transforms(depsgraph: bpy.types.Depsgraph) -> Float32:
     matrices = np.empty(len(depsgraph.object_instances) * 16, np.float32)
     depsgraph.object_instances.foreach_get("matrix_world", matrices)
     return np.ascontiguousarray(matrices.reshape(-1, 4, 4).transpose(0, 2, 1)[:, :3])
-
-
-def is_singular(transforms: Float32) -> Any:
-    """(I,) whether a transform flattens space, judged without regard to its overall scale."""
-    linear = transforms[:, :, :3].astype(np.float64)
-    with np.errstate(invalid="ignore", over="ignore"):
-        volume = np.linalg.norm(linear, axis=1).prod(axis=1)
-        return ~(np.abs(np.linalg.det(linear)) > 1e-7 * volume)
 
 
 __all__ = ["ExportError", "Notes", "export_scene"]

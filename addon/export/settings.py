@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
+
 from vlp_bpt.settings import RenderSettings
 
 
@@ -13,7 +15,12 @@ def export_settings(scene: Any) -> RenderSettings:
 
     Without a number of threads of its own, the render takes the one of Blender's (`blender -t`).
     """
-    values = {field.name: getattr(scene.vlp_bpt, field.name) for field in fields(RenderSettings)}
+    values = {field.name: _typed(getattr(scene.vlp_bpt, field.name)) for field in fields(RenderSettings)}
     if values["threads"] == 0 and scene.render.threads_mode == "FIXED":
         values["threads"] = scene.render.threads
     return RenderSettings.from_dict(values)
+
+
+def _typed(value: Any) -> Any:
+    """A setting as it was typed: Blender keeps numbers in single precision, where 0.01 is a little less than that."""
+    return float(str(np.float32(value))) if isinstance(value, float) else value

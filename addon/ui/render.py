@@ -78,6 +78,28 @@ class VLP_BPT_PT_performance(_RenderPanel, bpy.types.Panel):
         column.prop(context.scene.render, "use_persistent_data", text="Keep Data")
 
 
+class VLP_BPT_PT_simplify(_RenderPanel, bpy.types.Panel):
+    """In place of Blender's own, which would come first."""
+
+    bl_label = "Simplify"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context: Any) -> None:
+        self.layout.prop(context.scene.render, "use_simplify", text="")
+
+    def draw(self, context: Any) -> None:
+        column, _ = self.column(context)
+        render = context.scene.render
+        column.active = render.use_simplify
+        for use, subdivision, particles in (
+            ("Viewport", "simplify_subdivision", "simplify_child_particles"),
+            ("Render", "simplify_subdivision_render", "simplify_child_particles_render"),
+        ):
+            values = column.column(align=True)
+            values.prop(render, subdivision, text=f"Max Subdivision {use}")
+            values.prop(render, particles, text="Max Child Particles")
+
+
 class VLP_BPT_PT_statistics(_RenderPanel, bpy.types.Panel):
     bl_label = "Statistics"
     bl_options = {"DEFAULT_CLOSED"}
@@ -106,6 +128,7 @@ CLASSES = (
     VLP_BPT_PT_light_paths,
     VLP_BPT_PT_film,
     VLP_BPT_PT_performance,
+    VLP_BPT_PT_simplify,
     VLP_BPT_PT_statistics,
 )
 

@@ -41,7 +41,7 @@ def render_blend(
 ) -> BlendRender:
     """Renders a frame through Blender's own pipeline (layers, compositor, colour management) into `output`.
 
-    `values` are settings that replace the file's. Raises BlenderError, or what the render raised.
+    `values` are settings that replace the file's. Raises BlenderError, or Cancelled where no iteration was complete.
     """
     bpy = _open(path, frame, values)
     render = bpy.context.scene.render
@@ -70,6 +70,9 @@ def render_blend(
 
     output.unlink(missing_ok=True)
     _render(bpy, path, Watched, result.warnings, write_still=True)
+    if result.renderers and not any(renderer.iterations for renderer in result.renderers):
+        output.unlink(missing_ok=True)  # Blender writes it black
+        raise Cancelled(f"'{path}': cancelled before its first iteration was complete")
     if not output.is_file():
         raise BlenderError(f"'{path}': Blender wrote no '{output}'")
     return result

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 from . import __version__, metrics
 from ._progress import ProgressDisplay, summary_text
-from .errors import DeviceError, Error, SceneError
+from .errors import Cancelled, DeviceError, Error, SceneError
 from .images import Depth, check_output, read_image, write_image
 from .merge import merge_images
 from .render import Renderer, Statistics, devices, load_native, native_errors
@@ -46,11 +46,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(options.run(options))
     except (SceneError, DeviceError) as error:
         return _fail(error, FAILED)
-    except Error as error:
-        return _fail(error, USAGE)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Cancelled):  # with no iteration complete there is no picture
         print("vlp-bpt: interrupted", file=sys.stderr)
         return INTERRUPTED
+    except Error as error:
+        return _fail(error, USAGE)
     except BrokenPipeError:  # standard output was closed, as by `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return FAILED
@@ -273,7 +273,7 @@ def _info_scene(path: Path) -> int:
         upload(scene, native_scene)
         native_scene.build(0)
     info = native_scene.info()
-    print(f"  emitters: {info['emitters']}, built in {info['build_seconds']:.3f} s")
+    print(f"  glowing triangles and spheres: {info['emitters']}; built in {info['build_seconds']:.3f} s")
     parts = ", ".join(f"{name} {size / 2**20:.2f}" for name, size in info["bytes"].items())
     print(f"  memory (MiB): {parts}")
     _warn(warnings)

@@ -179,9 +179,12 @@ class Renderer:
             self._native.add_film_state(np.ascontiguousarray(state, dtype=np.int64), iterations)
 
     def metadata(self) -> dict[str, Any]:
-        """What a file should say about the picture: settings, iterations and their ranges, seconds, film and so on."""
+        """What a file should say about the picture: version, settings, iterations, their ranges, seconds, film."""
+        from . import __version__
+
         statistics = asdict(self.statistics)
         return {
+            "version": __version__,
             "settings": self.settings.to_dict(),
             "iterations": self.iterations,
             "ranges": [[self.first_iteration, self.first_iteration + self._rendered]],

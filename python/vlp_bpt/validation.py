@@ -34,7 +34,8 @@ from .scene import (
 MAX_SLOTS = 65536  # material slots of one geometry: 16 bits a primitive in the native core
 MAX_LOBES = 127  # lobes of one material: `layered_under` is 8 bits in the native core
 MAX_RESOLUTION = 65536
-_LEAST_DETERMINANT = 1e-36  # of a transform: its inverse must not overflow float32
+# Of a transform's determinant: neither it nor its inverse may overflow float32.
+_LEAST_DETERMINANT, _MOST_DETERMINANT = 1e-36, 1e36
 
 
 def validate(scene: Scene) -> list[str]:
@@ -125,12 +126,13 @@ def _check_instance(instance: Instance, geometry_count: int, material_count: int
 
 
 def is_singular(transforms: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Which of the transforms (N, 3, 4) flatten space or have entries that are not finite: they cannot be rendered."""
+    """Which of the transforms (N, 3, 4) cannot be rendered: they flatten space, scale it beyond what float32 holds, or
+    have entries that are not finite."""
     linear = transforms[:, :, :3].astype(np.float64)
     with np.errstate(invalid="ignore", over="ignore"):
-        determinant = np.linalg.det(linear)
+        volume = np.abs(np.linalg.det(linear))
         lengths = np.linalg.norm(linear, axis=1).prod(axis=1)  # relative to it, rounding leaves about 1e-7
-        usable = (np.abs(determinant) > _LEAST_DETERMINANT) & (np.abs(determinant) > 1e-7 * lengths)
+        usable = (volume > _LEAST_DETERMINANT) & (volume < _MOST_DETERMINANT) & (volume > 1e-7 * lengths)
     usable &= np.isfinite(transforms).all(axis=(1, 2))
     return np.asarray(~usable)
 
@@ -146,7 +148,8 @@ def _check_transforms(instances: list[Instance]) -> None:
         i = int(np.argmax(singular))
         _check_finite_transform(f"instance '{instances[i].name}'", transforms[i])
         determinant = np.linalg.det(transforms[i, :, :3].astype(np.float64))
-        raise SceneError(f"instance '{instances[i].name}': transform is singular (determinant {determinant:.6g})")
+        fault = "scales too far" if abs(determinant) >= _MOST_DETERMINANT else "is singular"
+        raise SceneError(f"instance '{instances[i].name}': transform {fault} (determinant {determinant:.6g})")
 
 
 # Materials

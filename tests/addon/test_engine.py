@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -250,6 +251,17 @@ def test_the_status_line_says_how_it_goes(out: Path, watch: Watch) -> None:
     assert watch.lines[-1] == ("Iteration 2/2 | 0.00 Mpaths/s | 42 VLPs | Mem 1.0 MB | 0:00:02 left | 1 warning")
 
 
+def test_without_a_window_the_console_is_not_flooded(out: Path, watch: Watch, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenes.camera()
+    bpy.context.scene.vlp_bpt.samples = 40
+    monkeypatch.setattr(FakeRenderer, "seconds_per_iteration", 0.05)
+    monkeypatch.setattr(final, "SECONDS_BETWEEN_PRINTED_LINES", 0.5)
+    render()
+    lines = [line for line in watch.lines if line.startswith("Iteration")]
+    assert 3 <= len(lines) <= 6
+    assert lines[-1].startswith("Iteration 40/40")
+
+
 def test_esc_keeps_the_picture_so_far(
     out: Path, fake: list[FakeRenderer], watch: Watch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -261,6 +273,22 @@ def test_esc_keeps_the_picture_so_far(
     assert fake[0].finished_at - watch.esc_at < 0.3
     assert watch.ends == [{"cancel": True, "do_merge_results": True}]
     assert pixels(out)[0, 0, 2] == fake[0].iterations >= 2
+
+
+def test_disabling_the_add_on_first_ends_its_renders(
+    out: Path, fake: list[FakeRenderer], watch: Watch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenes.camera()
+    bpy.context.scene.vlp_bpt.samples = 1000
+    monkeypatch.setattr(FakeRenderer, "seconds_per_iteration", 0.1)
+    threading.Timer(0.5, final.stop_all).start()
+    render()
+    assert 2 <= fake[0].iterations == pixels(out)[0, 0, 2] < 20
+    assert watch.ends == [{"cancel": True, "do_merge_results": True}]
+    time.sleep(0.5)
+    bpy.context.scene.vlp_bpt.samples = 1
+    render()  # the next one is not stopped
+    assert pixels(out)[0, 0, 2] == 1
 
 
 def test_esc_before_the_first_iteration(out: Path, watch: Watch) -> None:

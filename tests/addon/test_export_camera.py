@@ -68,6 +68,14 @@ def test_depth_of_field_by_distance() -> None:
     assert camera.focus_distance == 3
 
 
+def test_a_focus_distance_of_zero_can_be_rendered() -> None:
+    camera = scenes.camera()
+    camera.data.dof.use_dof, camera.data.dof.focus_distance = True, 0.0
+    exported = scenes.export()
+    exported.validate()
+    assert 0 < exported.camera.focus_distance < 1e-3
+
+
 def test_depth_of_field_by_object_counts_along_the_view() -> None:
     dof = scenes.camera().data.dof
     target = scenes.link("target", None)

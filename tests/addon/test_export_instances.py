@@ -7,8 +7,10 @@ from typing import Any
 import bpy
 import bpy_scenes as scenes
 import numpy as np
+import pytest
 
 from addon.export.notes import Notes
+from vlp_bpt.errors import SceneError
 from vlp_bpt.scene import Spheres, Visibility
 
 
@@ -176,7 +178,23 @@ def test_a_scale_of_zero_is_left_out_and_named() -> None:
     tiny.scale = (1e-5, 1e-5, 1e-5)
     notes = Notes()
     assert [item.name for item in scenes.export(notes).instances] == ["tiny"]
-    assert any("'flat'" in text and "0.0" in text for text in notes.warnings)
+    assert any("'flat'" in text and "(1, 0, 1)" in text for text in notes.warnings)
+
+
+@pytest.mark.parametrize("scale", [1e-20, 1e20])
+def test_a_scale_beyond_single_precision_is_left_out_and_named(scale: float) -> None:
+    scenes.link("odd", scenes.mesh()).scale = (scale, scale, scale)
+    notes = Notes()
+    exported = scenes.export(notes)
+    assert exported.instances == []
+    exported.validate()
+    assert any("'odd'" in text and f"{scale:g}" in text for text in notes.warnings)
+
+
+def test_a_transform_that_is_not_a_number_is_an_error() -> None:
+    scenes.link("lost", scenes.mesh()).location.x = float("nan")
+    with pytest.raises(SceneError, match=r"'lost'.*nan"):
+        scenes.export().validate()
 
 
 def test_what_is_not_there_yet_is_named_once() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -11,7 +10,7 @@ import bpy_scenes as scenes
 import numpy as np
 import pytest
 
-from addon.export.notes import ExportError, Notes
+from addon.export.notes import Notes
 from vlp_bpt.scene import AreaLight, PointLight, SpotLight, SunLight
 
 
@@ -130,6 +129,23 @@ def test_a_lamp_scaled_to_nothing_is_left_out() -> None:
     assert len(notes.warnings) == 1
 
 
+@pytest.mark.parametrize("kind", ["SPOT", "SUN"])
+def test_a_lamp_without_direction_is_left_out_and_named(kind: str) -> None:
+    scenes.light(kind).scale = (0, 0, 0)
+    notes = Notes()
+    assert scenes.export(notes).lights == []
+    (warning,) = notes.warnings
+    assert f"'{kind.title()}'" in warning
+
+
+def test_a_spread_of_zero_is_next_to_parallel() -> None:
+    scenes.light("AREA", energy=1, spread=0)
+    exported = scenes.export()
+    exported.validate()
+    (light,) = exported.lights
+    assert 0 < light.spread < 0.01
+
+
 def test_lamps_without_power_are_left_out() -> None:
     scenes.light("POINT", energy=0)
     notes = Notes()
@@ -158,10 +174,13 @@ def world(**values: Any) -> Any:
     made = bpy.data.worlds.new("World")
     made.use_nodes = True
     bpy.context.scene.world = made
-    node = next(node for node in made.node_tree.nodes if node.bl_idname == "ShaderNodeBackground")
     for name, value in values.items():
-        scenes.socket(node, name).default_value = value
+        scenes.socket(background(made), name).default_value = value
     return made
+
+
+def background(made: Any) -> Any:
+    return next(node for node in made.node_tree.nodes if node.bl_idname == "ShaderNodeBackground")
 
 
 def test_world_colour_and_strength() -> None:
@@ -177,6 +196,31 @@ def test_no_world_is_black() -> None:
 def test_a_world_without_surface_is_black() -> None:
     world().node_tree.links.clear()
     assert scenes.export().world.radiance == (0, 0, 0)
+
+
+@pytest.mark.parametrize("factor", [None, 0.25])
+def test_worlds_are_added_and_mixed(factor: float | None) -> None:
+    made = world(Color=(0.4, 0.2, 0.0, 1), Strength=2)
+    tree = made.node_tree
+    other = tree.nodes.new("ShaderNodeBackground")
+    scenes.socket(other, "Color").default_value = (0, 0, 1, 1)
+    both = tree.nodes.new("ShaderNodeAddShader" if factor is None else "ShaderNodeMixShader")
+    if factor is not None:
+        scenes.socket(both, "Fac").default_value = factor
+    tree.links.new(background(made).outputs[0], scenes.socket(both, "Shader"))
+    tree.links.new(other.outputs[0], scenes.socket(both, "Shader_001"))
+    tree.links.new(both.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    notes = Notes()
+    wanted = (0.8, 0.4, 1.0) if factor is None else (0.6, 0.3, 0.25)
+    assert scenes.export(notes).world.radiance == pytest.approx(wanted)
+    assert notes.warnings == []
+
+
+def test_negative_light_of_the_world_is_named() -> None:
+    world(Color=(1, 1, 1, 1), Strength=-1)
+    notes = Notes()
+    assert scenes.export(notes).world.radiance == (0, 0, 0)
+    assert "World 'World'" in notes.warnings[0] and "negative" in notes.warnings[0]
 
 
 def environment(made: Any) -> Any:
@@ -196,8 +240,8 @@ def test_a_world_image() -> None:
     notes = Notes()
     found = scenes.export(notes).world
     assert notes.warnings == []
-    assert found.radiance == (2, 2, 2)
-    assert found.image == pytest.approx(pixels[..., :3] * pixels[..., 3:])
+    assert found.radiance == (1, 1, 1)
+    assert found.image == pytest.approx(2 * pixels[..., :3] * pixels[..., 3:])
     assert (found.rotation == np.eye(3)).all()
 
 
@@ -227,26 +271,51 @@ def test_a_world_image_in_bytes_is_made_linear() -> None:
     assert found[0, 1] == pytest.approx((0.0016, 0.0331, 0.6038), abs=2e-3)
 
 
-def test_an_absent_world_image_is_named(tmp_path: Path) -> None:
-    node, _ = environment(world())
-    node.image = bpy.data.images.new("gone", 8, 4)
-    node.image.source, node.image.filepath = "FILE", str(tmp_path / "gone.hdr")
-    with pytest.raises(ExportError, match=r"World 'World'.*image 'gone'.*gone\.hdr"):
-        scenes.export()
+def test_a_missing_world_image_is_named_with_its_file() -> None:
+    node, _ = environment(world(Strength=2))
+    node.image = bpy.data.images.new("gone.hdr", 8, 4)
+    node.image.source, node.image.filepath = "FILE", "/nowhere/gone.hdr"
+    notes = Notes()
+    assert scenes.export(notes).world.radiance == (2, 0, 2)  # magenta, as in Blender
+    assert "World 'World'" in notes.warnings[0] and "/nowhere/gone.hdr" in notes.warnings[0]
 
 
 def test_a_world_without_its_image_is_magenta() -> None:
     node, _ = environment(world())
     node.image = None
-    assert scenes.export().world.image.tolist() == [[[1, 0, 1]]]
+    notes = Notes()
+    assert scenes.export(notes).world.radiance == (1, 0, 1)
+    assert "no image" in notes.warnings[0]
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_world_images_are_added(alike: bool) -> None:
+    """Of one size and rotation texel by texel; else the second counts as its mean over directions."""
+    made = world(Strength=2)
+    _, pixels = environment(made)
+    tree = made.node_tree
+    other, second = tree.nodes.new("ShaderNodeTexEnvironment"), tree.nodes.new("ShaderNodeBackground")
+    other.image = bpy.data.images.new("other", 8, 4 if alike else 90, float_buffer=True)
+    white = np.zeros((other.image.size[1], 8, 4), np.float32)
+    white[2 * len(white) // 3 :] = 1  # above a height of 30 degrees
+    other.image.pixels.foreach_set(white.ravel())
+    both = tree.nodes.new("ShaderNodeAddShader")
+    tree.links.new(other.outputs[0], scenes.socket(second, "Color"))
+    tree.links.new(background(made).outputs[0], scenes.socket(both, "Shader"))
+    tree.links.new(second.outputs[0], scenes.socket(both, "Shader_001"))
+    tree.links.new(both.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    notes = Notes()
+    found = scenes.export(notes).world
+    first = 2 * pixels[..., :3] * pixels[..., 3:]
+    assert found.image == pytest.approx(first + (white[..., :3] if alike else 0.25), rel=1e-3)
+    assert len(notes.warnings) == (0 if alike else 1)
 
 
 def test_a_textured_world_is_reported_once() -> None:
     made = world(Color=(0.5, 0.5, 0.5, 1))
-    node = next(node for node in made.node_tree.nodes if node.bl_idname == "ShaderNodeBackground")
     sky = made.node_tree.nodes.new("ShaderNodeTexSky")
-    made.node_tree.links.new(sky.outputs[0], scenes.socket(node, "Color"))
+    made.node_tree.links.new(sky.outputs[0], scenes.socket(background(made), "Color"))
     notes = Notes()
     assert scenes.export(notes).world.radiance == pytest.approx((0.5, 0.5, 0.5))
     assert len(notes.warnings) == 1
-    assert "Sky Texture" in notes.warnings[0] and "World 'World'" in notes.warnings[0]
+    assert notes.warnings[0].startswith("World 'World': node Sky Texture is not there yet")

@@ -82,6 +82,17 @@ def test_refraction() -> None:
     check(made, materials.refraction(RED, 0.1, 1.33))
 
 
+@pytest.mark.parametrize("roughness", [0.0, 0.3])
+def test_the_distribution_of_a_new_refraction_node_matters_only_when_it_is_rough(roughness: float) -> None:
+    made, (node,) = scenes.material("m", "ShaderNodeBsdfRefraction")
+    node.distribution = "BECKMANN"
+    put(node, Roughness=roughness)
+    notes = Notes()
+    exported(made, notes)
+    assert [warning for warning in notes.warnings if "Beckmann" in warning] == notes.warnings
+    assert len(notes.warnings) == (1 if roughness else 0)
+
+
 def test_transparent_and_translucent() -> None:
     for kind, make in (("Transparent", materials.transparent), ("Translucent", materials.translucent)):
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -317,7 +328,7 @@ def test_what_is_not_there_yet_stands_in_and_is_reported_once() -> None:
     (found,) = scenes.export(notes).materials
     wanted = materials.add(materials.principled(RED, roughness=0.3), materials.diffuse(RED))
     assert_same(found, replace(wanted, name="m"))
-    for words in ("Noise Texture", "Toon BSDF", "coat"):
+    for words in ("node Noise Texture is", "node Toon BSDF is", "node Principled BSDF: coat"):
         assert sum(words in text for text in notes.warnings) == 1, notes.warnings
     assert len(notes.warnings) == 3
 

@@ -82,6 +82,21 @@ def test_each_setting_is_exported() -> None:
     assert {name: getattr(settings, name) for name in values} == values
 
 
+def test_every_value_that_a_setting_can_have_in_blender_is_valid() -> None:
+    shown = bpy.context.scene.vlp_bpt
+    for name in RANGES:
+        definition = shown.bl_rna.properties[name]
+        for value in (definition.hard_min, definition.hard_max):
+            setattr(shown, name, value)
+            export_settings(bpy.context.scene).validate()
+        shown.property_unset(name)
+
+
+def test_numbers_are_exported_as_typed() -> None:
+    bpy.context.scene.vlp_bpt.filter_width = 1.7
+    assert export_settings(bpy.context.scene).filter_width == 1.7
+
+
 def test_blenders_own_thread_count_is_heard() -> None:
     scene = bpy.context.scene
     scene.render.threads_mode, scene.render.threads = "FIXED", 3
@@ -105,13 +120,13 @@ def test_panels_of_blender_that_fit_are_shown() -> None:
         "WORLD_PT_context_world",
     }
     assert wanted <= names
-    assert not {"DATA_PT_light", "MATERIAL_PT_preview", "VIEWLAYER_PT_layer_passes"} & names
+    assert not {"DATA_PT_light", "RENDER_PT_simplify", "MATERIAL_PT_preview", "VIEWLAYER_PT_layer_passes"} & names
     assert not {name for name in names if name.startswith(("CYCLES", "RENDER_PT_eevee"))}
 
 
 def test_panels_of_this_addon_are_for_this_engine_alone() -> None:
     own = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("VLP_BPT_PT")]
-    assert len(own) == 7
+    assert len(own) == 8
     assert all({"VLP_BPT"} == panel.COMPAT_ENGINES for panel in own)
 
 

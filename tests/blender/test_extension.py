@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -83,6 +84,33 @@ def test_renders_a_frame(blender: Blender, tmp_path: Path) -> None:
     )
     assert result.returncode == 0, result.stdout
     assert_shows_something(tmp_path / "x_0001.png")
+
+
+@pytest.mark.parametrize("file_format, depth", [("PNG", "8"), ("OPEN_EXR", "32")])
+def test_the_picture_is_the_one_made_through_bpy(
+    blender: Blender, tmp_path: Path, file_format: str, depth: str
+) -> None:
+    """The installed zip and the bpy module of the source tree, two builds of one core, draw the same paths.
+
+    Rounding may differ from build to build. Where it sends a path past an edge, a pixel is another one: at most one in
+    10,000 may be.
+    """
+    suffix = {"PNG": ".png", "OPEN_EXR": ".exr"}[file_format]
+    module = tmp_path / f"module{suffix}"
+    options = f"render {SCENE} -o {module} --samples 2 --frame 1 --quiet".split()
+    subprocess.run([sys.executable, "-m", "vlp_bpt", *options], cwd=ROOT, check=True, timeout=400)
+    expression = (
+        "import bpy; scene = bpy.context.scene; scene.vlp_bpt.samples = 2; image = scene.render.image_settings; "
+        f"image.file_format, image.color_depth, image.color_mode = '{file_format}', '{depth}', 'RGB'"
+    )
+    result = blender("-b", SCENE, "-E", "VLP_BPT", "--python-expr", expression, "-o", tmp_path / "x_", "-f", "1")
+    assert result.returncode == 0, result.stdout
+    found, wanted = read(tmp_path / f"x_0001{suffix}"), read(module)
+    assert found.shape == wanted.shape == (512, 512, 3)
+    assert wanted.std() > 0.02
+    bound = 1.5 / 255 if file_format == "PNG" else 1e-5 + 1e-4 * wanted
+    differ = (np.abs(found - wanted) > bound).any(axis=2)
+    assert differ.mean() <= 1e-4
 
 
 def test_renders_an_animation(blender: Blender, tmp_path: Path) -> None:

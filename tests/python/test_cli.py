@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import signal
 import subprocess
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from small_scenes import room
+from terminals import OnTerminal
 
 from vlp_bpt import Mode, RenderSettings, __version__
 from vlp_bpt.images import Image, read_image, write_image
@@ -201,30 +201,6 @@ def test_a_scene_that_cannot_be_rendered(folder: Path) -> None:
     assert result.stderr.startswith("vlp-bpt: device HYBRID")
 
 
-class OnTerminal:
-    """`vlp-bpt ARGUMENTS` with its standard error on a terminal."""
-
-    def __init__(self, folder: Path, *arguments: str) -> None:
-        self._terminal, inner = os.openpty()
-        self.process = subprocess.Popen(
-            command(*arguments), cwd=folder, stdout=subprocess.PIPE, stderr=inner, text=True
-        )
-        os.close(inner)
-        self.shown = b""
-
-    def read_until(self, text: bytes | None) -> None:
-        """Reads what is shown until `text` came, or to the end."""
-        while text is None or text not in self.shown:
-            try:
-                read = os.read(self._terminal, 65536)
-            except OSError:  # the other end was closed
-                read = b""
-            if not read:
-                os.close(self._terminal)
-                return
-            self.shown += read
-
-
 def test_interrupting_keeps_the_picture(folder: Path) -> None:
     terminal = OnTerminal(folder, "render", "room.vlp.npz", "-o", "a.exr", "--samples", "100000000")
     terminal.read_until(b"Msamples/s")  # shown once an iteration is complete
@@ -234,6 +210,19 @@ def test_interrupting_keeps_the_picture(folder: Path) -> None:
     assert terminal.process.returncode == 130
     assert out.rstrip().endswith("(interrupted)")
     assert read_image(folder / "a.exr").metadata["iterations"] > 0
+
+
+def test_interrupting_before_the_first_picture_leaves_none(folder: Path) -> None:
+    slow = ("light_samples=1024", "vlp_connections=1024", "light_paths=2000000")
+    settings = [word for value in slow for word in ("--set", value)]
+    terminal = OnTerminal(folder, "render", "room.vlp.npz", "-o", "a.exr", *settings)
+    terminal.read_until(b" 0/6 iterations")
+    terminal.process.send_signal(signal.SIGINT)
+    terminal.read_until(None)
+    terminal.process.communicate(timeout=20)
+    assert terminal.process.returncode == 130
+    assert terminal.shown.rstrip().endswith(b"vlp-bpt: interrupted")
+    assert not (folder / "a.exr").exists()
 
 
 def test_progress_on_a_terminal_and_without_one(folder: Path) -> None:

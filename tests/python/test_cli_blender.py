@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from terminals import OnTerminal
 
 from vlp_bpt.images import read_image
 from vlp_bpt.snapshot import load_snapshot
@@ -126,3 +128,16 @@ def test_failures_are_said_in_one_line(folder: Path, arguments: tuple[str, ...],
     assert result.stderr.startswith(f"vlp-bpt: {message}"), result.stderr
     assert result.stderr.count("\n") == 1
     assert not (folder / "x.png").exists()
+
+
+def test_interrupting_before_the_first_picture_leaves_none(folder: Path) -> None:
+    slow = ("light_samples=1024", "vlp_connections=1024", "light_paths=2000000")
+    settings = [word for value in slow for word in ("--set", value)]
+    terminal = OnTerminal(folder, "render", "box.blend", "-o", "none.exr", "--samples", "6", *settings)
+    terminal.read_until(b" 0/6 iterations")
+    terminal.process.send_signal(signal.SIGINT)
+    terminal.read_until(None)
+    terminal.process.communicate(timeout=30)
+    assert terminal.process.returncode == 130
+    assert terminal.shown.rstrip().endswith(b"vlp-bpt: interrupted")
+    assert not (folder / "none.exr").exists()

@@ -92,6 +92,7 @@ def test_all_iterations_are_rendered_and_averaged(fake: Any) -> None:
     assert image.pixels.shape == (12, 16, 4)
     assert image.metadata["ranges"] == [[10, 15]]
     assert image.metadata["iterations"] == 5
+    assert image.metadata["version"] == vlp_bpt.__version__
     assert image.metadata["settings"]["samples"] == 5
     assert threading.current_thread().name not in renderer._native.threads
 

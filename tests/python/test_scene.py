@@ -191,6 +191,10 @@ FAULTS: list[tuple[Callable[[Scene], object], str]] = [
         lambda s: s.instances.append(Instance("I", 0, [[1, 2, 3, 0], [4, 5, 6, 0], [7, 8, 9, 0]])),  # type: ignore[arg-type]
         "instance 'I': transform is singular (determinant ",
     ),
+    (
+        lambda s: s.instances.append(Instance("I", 0, np.eye(3, 4) * 1e20)),  # type: ignore[arg-type]
+        "instance 'I': transform scales too far (determinant 1e+60)",
+    ),
     (lambda s: with_material(s, emission=(1, -1, 0)), "material 'grey': emission -1 must be finite and not negative"),
     (lambda s: with_material(s, emission=(1, NAN, 0)), "material 'grey': emission nan must be finite and not negative"),
     (
