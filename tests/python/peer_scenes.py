@@ -32,7 +32,10 @@ def blend(name: str) -> Path:
 
 
 def bumpy_furnace(builder: Any, scene: Any) -> None:
-    """A shining grey room around a ball and over a floor whose normals wave by 17 degrees, as a bump map's would."""
+    """A shining grey room around a ball and over a floor whose normals wave by 17 degrees, as a bump map's would.
+
+    A black sheet lies under the floor: Cycles' light samples pass through a surface whose normals lean over them.
+    """
     walls = builder.diffuse("walls", (0.5, 0.5, 0.5))
     _glow(walls, (0.4, 0.5, 0.6))
     builder.block("room", (-2, -2, -1), (2, 2, 2), walls)
@@ -48,6 +51,10 @@ def bumpy_furnace(builder: Any, scene: Any) -> None:
     faces = [(k, k + 1, k + n + 2, k + n + 1) for k in corners]
     floor = builder.mesh("floor", points, faces, grey)
     floor.location = (0, 0, -0.9)
+    black = builder.diffuse("black", (0, 0, 0))
+    builder.mesh(
+        "sheet", [(-1.5, -1.5, -0.92), (1.5, -1.5, -0.92), (1.5, 1.5, -0.92), (-1.5, 1.5, -0.92)], [(0, 1, 2, 3)], black
+    )
     _wave(floor.data, 5.0)
     builder.camera(scene, (-0.9, -1.8, 1.0), (0.1, 0.2, -0.1), 24.0, 32.0, clip_start=0.05)
 
