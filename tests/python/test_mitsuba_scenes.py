@@ -59,6 +59,13 @@ def holding(material: Material, shape: Any = None, matrix: Any = AT) -> Scene:
     return builder.scene
 
 
+def under_lamp(material: Material) -> Scene:
+    """A thing whose highlight shows how rough it is."""
+    scene = stage().add(sphere(), material, AT).scene
+    scene.lights = [PointLight("lamp", (0.6, -1.8, 2.0), (60, 50, 40), 0.1)]
+    return scene
+
+
 def hidden_lamp(**change: Any) -> AreaLight:
     return replace(AreaLight("lamp", TURNED, (20, 18, 15), (0.8, 0.5)), **change)
 
@@ -84,8 +91,8 @@ ALIKE: dict[str, Callable[[], Scene]] = {
     "shining sphere": lambda: stage().add(sphere(), grey(0.4, 2.0), AT).scene,
     "sky": lambda: holding(grey(0.5)),
     "mirror": lambda: holding(materials.mirror((0.9, 0.8, 0.7))),
-    "metal": lambda: holding(materials.glossy((0.9, 0.8, 0.7), 0.4, "GGX")),
-    "conductor": lambda: holding(materials.conductor(roughness=0.3, distribution="GGX")),
+    "metal": lambda: under_lamp(materials.glossy((0.9, 0.8, 0.7), 0.4, "GGX")),
+    "conductor": lambda: under_lamp(materials.conductor(roughness=0.3, distribution="GGX")),
     "glass": lambda: holding(materials.glass((0.9, 1.0, 0.95))),
     "mirrored mesh of glass": lambda: holding(
         materials.glass(), ball(smooth=False), transform((0, 0, 0.7), (-0.5, 0.5, 0.5))
