@@ -62,6 +62,11 @@ test-python311: .bootstrap/.uv-$(UV_VERSION) build
 	elif [ -n "$${CI:-}" ]; then exit 1; \
 	else echo "vlp-bpt: LEFT OUT: the tests with Blender 4.5, which need Python 3.11"; fi
 
+# Debian's libllvm19 makes Mitsuba several times faster; it works without.
+.PHONY: test-slow
+test-slow: build .venv/.peers ## the tests that take minutes each, beside Cycles and Mitsuba
+	$(PY) -m pytest tests --ignore=tests/blender --ignore=tests/gpu --slow -m slow $(PYTEST_ARGS)
+
 .PHONY: bench
 bench: build ## speed and error over time, beside Cycles
 	.venv/bin/vlp-bpt bench
@@ -143,7 +148,7 @@ gpu-check: ## build with CUDA and test, on a machine with a GPU and no package r
 	@.ci/system.sh bpy $(PY311)
 	@touch $@
 
-.venv/.lint .venv/.wheel: .venv/.%: .venv/.ready
+.venv/.lint .venv/.wheel .venv/.peers: .venv/.%: .venv/.ready
 	@.ci/venv.sh .venv "" $*
 	@touch $@
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from .image import MISSING, export_image
 
 if TYPE_CHECKING:
     from .nodes import Graph, Place
@@ -138,28 +140,26 @@ def _combine(graph: Graph, place: Place) -> Value | None:
 
 
 def _image(graph: Graph, place: Place) -> Value | None:
-    """The mean of an image: what stands in for a texture that is not looked up. An environment's is over directions."""
+    """The mean of an image: what stands in for a texture that is not looked up."""
     image = place.node.image
     if image is None:
         graph.notes.warn(f"{graph.owner}: {place.node.bl_label} '{place.node.name}' has no image")
         return (0.0, 0.0, 0.0)
-    if image.size[0] * image.size[1] == 0:
-        graph.notes.warn(f"{graph.owner}: image '{image.name}' cannot be read from '{image.filepath}'")
-        return (1.0, 0.0, 1.0)  # Blender's sign for a missing image
+    colors = export_image(image, graph.owner, graph.notes)
+    if colors is None:
+        return MISSING
     graph.notes.warn(f"{graph.owner}: image '{image.name}' is not there yet, its mean colour stands in for it")
-    buffer = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(buffer)
-    pixels = buffer.reshape(image.size[1], -1, image.channels)
     if place.socket.identifier == "Alpha":
-        return float(pixels[..., 3].mean(dtype=np.float64)) if image.channels == 4 else 1.0
-    colors = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
-    if not image.is_float and image.colorspace_settings.name == "sRGB":  # byte images hold encoded values
-        colors = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
-    weights = np.ones(len(colors))
-    if getattr(place.node, "projection", "") == "EQUIRECTANGULAR":  # rows are smaller towards the poles
-        weights = np.sin((np.arange(len(colors)) + 0.5) * np.pi / len(colors))
-    rows = colors.mean(axis=1, dtype=np.float64)
-    return _triple(float(mean) for mean in np.average(rows, axis=0, weights=weights))
+        return _mean_alpha(image)
+    return _triple(float(mean) for mean in colors.mean(axis=(0, 1), dtype=np.float64))
+
+
+def _mean_alpha(image: Any) -> float:
+    if image.channels < 4:
+        return 1.0
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    return float(pixels[3::4].mean(dtype=np.float64))
 
 
 FOLDABLE: dict[str, Callable[[Graph, Place], Value | None]] = {
@@ -175,5 +175,4 @@ FOLDABLE: dict[str, Callable[[Graph, Place], Value | None]] = {
     "ShaderNodeCombineXYZ": _combine,
     "ShaderNodeRGBToBW": lambda graph, place: as_number(_color(graph, place, "Color")),
     "ShaderNodeTexImage": _image,
-    "ShaderNodeTexEnvironment": _image,
 }

@@ -10,6 +10,7 @@
 #include "bindings/bindings.h"
 #include "bvh/traverse.h"
 #include "camera/camera_build.h"
+#include "geometry/surface.h"
 #include "light/light_build.h"
 #include "scene/material_build.h"
 #include "scene/scene.h"
@@ -61,6 +62,13 @@ nb::ndarray<nb::numpy, T, nb::ndim<1>> to_numpy(std::vector<T> values) {
     return nb::ndarray<nb::numpy, T, nb::ndim<1>>(owned->data(), {owned->size()}, owner);
 }
 
+// (n, 3) float32.
+nb::ndarray<nb::numpy, float, nb::ndim<2>> to_numpy(const std::vector<Vec3>& values) {
+    auto* owned = new std::vector<Vec3>(values);
+    nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<Vec3>*>(p); });
+    return nb::ndarray<nb::numpy, float, nb::ndim<2>>(owned->data(), {owned->size(), 3}, owner);
+}
+
 // Directions need not be of unit length: t counts in their length.
 nb::dict intersect_rays(const Scene& scene, Triples origins, Triples directions, Floats t_max) {
     require_built(scene);
@@ -69,11 +77,13 @@ nb::dict intersect_rays(const Scene& scene, Triples origins, Triples directions,
     const auto o = span_of<Vec3>(origins), d = span_of<Vec3>(directions);
     const size_t n = o.size();
     std::vector<float> t(n), u(n), v(n);
+    std::vector<Vec3> normal(n);
     std::vector<uint32_t> primitive(n), instance(n);
     {
         nb::gil_scoped_release release;
         for (size_t i = 0; i < n; ++i) {
             const Hit hit = closest_hit(scene.view(), {o[i], d[i], t_max.data()[i]}, {});
+            if (hit.found()) normal[i] = surface_at(scene.view(), {o[i], d[i]}, hit).geometric_normal;
             t[i] = hit.t, u[i] = hit.u, v[i] = hit.v, primitive[i] = hit.primitive, instance[i] = hit.instance;
         }
     }
@@ -81,6 +91,7 @@ nb::dict intersect_rays(const Scene& scene, Triples origins, Triples directions,
     result["t"] = to_numpy(std::move(t));
     result["u"] = to_numpy(std::move(u));
     result["v"] = to_numpy(std::move(v));
+    result["normal"] = to_numpy(normal);
     result["primitive"] = to_numpy(std::move(primitive));
     result["instance"] = to_numpy(std::move(instance));
     return result;
@@ -186,6 +197,13 @@ void bind_scene(nb::module_& m) {
                                  visibility);
              })
         .def("set_world", [](Scene& s, Triple radiance) { s.set_world(rgb_of(radiance)); })
+        .def("set_world_image",
+             [](Scene& s, Array<const float, -1, -1, 3> texels, Array<const float, 3, 3> to_image) {
+                 const std::span<const Vec3> r = span_of<Vec3>(to_image);
+                 const Vec3 rows[3] = {r[0], r[1], r[2]};
+                 s.set_world_image(span_of<Rgb>(texels), static_cast<uint32_t>(texels.shape(1)),
+                                   static_cast<uint32_t>(texels.shape(0)), rows);
+             })
         .def("set_camera",
              [](Scene& s, FloatMatrix transform, int projection, float half_width, float half_height, float shift_x,
                 float shift_y, float clip_start, float clip_end, float aperture_radius, float focus_distance) {

@@ -33,4 +33,12 @@ VLP_HD inline DiscreteSample sample(const Distribution& d, uint32_t u) {
     return {low, pdf(d, low)};
 }
 
+// By a number in [0, 1); `rest` is where it lies between those of the index, in [0, 1).
+VLP_HD inline DiscreteSample sample(const Distribution& d, float u, float& rest) {
+    const uint32_t bits = static_cast<uint32_t>(u * 0x1p32f);
+    const DiscreteSample s = sample(d, bits);
+    rest = min_of(static_cast<float>(bits - d.below[s.index]) * 0x1p-32f / s.pdf, 1 - 0x1p-24f);
+    return s;
+}
+
 }  // namespace vlp

@@ -3,6 +3,7 @@
 
 #include "light/area.h"
 #include "light/environment.h"
+#include "light/lamp_tree.h"
 #include "light/mesh.h"
 #include "light/point.h"
 #include "light/spot.h"
@@ -35,7 +36,7 @@ VLP_HD inline Vec3 emission_normal(const Light& light, Vec3 position, Vec3 direc
 
 // Radiance that leaves the point `position` with emission normal `normal` in `direction` (unit, away from the light,
 // for infinite lights the way that light travels). Points without an extent: intensity; delta suns: irradiance.
-VLP_HD inline Rgb emitted(const SceneView&, const Light& light, Vec3 /*position*/, Vec3 normal, Vec3 direction) {
+VLP_HD inline Rgb emitted(const SceneView& scene, const Light& light, Vec3 /*position*/, Vec3 normal, Vec3 direction) {
     switch (light.kind) {
         case LightKind::point:
             return point_emitted(light, normal, direction);
@@ -47,8 +48,9 @@ VLP_HD inline Rgb emitted(const SceneView&, const Light& light, Vec3 /*position*
             return area_emitted(light, direction);
         case LightKind::triangle:
         case LightKind::sphere:
-        case LightKind::environment:
             return light.radiance;
+        case LightKind::environment:
+            return environment_radiance(scene.environment, light, -direction);
     }
     return {};
 }
@@ -68,7 +70,8 @@ VLP_HD inline Emission sample_emission(const SceneView& scene, const Light& ligh
         case LightKind::sphere:
             return sphere_sample_emission(light, u_position, u_direction);
         case LightKind::environment:
-            return environment_sample_emission(light, scene.center, scene.radius, u_position, u_direction);
+            return environment_sample_emission(scene.environment, light, scene.center, scene.radius, u_position,
+                                               u_direction);
     }
     return {};
 }
@@ -90,7 +93,7 @@ VLP_HD inline EmissionPdf pdf_emission(const SceneView& scene, const Light& ligh
         case LightKind::sphere:
             return surface_pdf_emission(light, position, normal, direction);
         case LightKind::environment:
-            return {pdf_scene_disc(scene.radius), pdf_cone(2.0f)};
+            return {pdf_scene_disc(scene.radius), environment_pdf(scene.environment, -direction)};
     }
     return {};
 }
@@ -117,15 +120,15 @@ VLP_HD inline NextEvent sample_next_event(const SceneView& scene, const Light& l
             return e;
         }
         case LightKind::environment:
-            return environment_sample_next_event(light, scene.radius, receiver, u);
+            return environment_sample_next_event(scene.environment, light, scene.radius, receiver, u);
     }
     return {};
 }
 
 // Density per solid angle at `receiver` with which next event finds the light's point `position`, which lies in
 // `direction` and whose emission normal is `normal`. 0 for delta lights and for points that it never draws.
-VLP_HD inline float pdf_next_event(const SceneView&, const Light& light, Vec3 receiver, Vec3 position, Vec3 normal,
-                                   Vec3 direction) {
+VLP_HD inline float pdf_next_event(const SceneView& scene, const Light& light, Vec3 receiver, Vec3 position,
+                                   Vec3 normal, Vec3 direction) {
     switch (light.kind) {
         case LightKind::point:
         case LightKind::spot:
@@ -139,7 +142,7 @@ VLP_HD inline float pdf_next_event(const SceneView&, const Light& light, Vec3 re
         case LightKind::sphere:
             return pdf_sphere_shape(light.position, light.radius, receiver, position, normal);
         case LightKind::environment:
-            return pdf_cone(2.0f);
+            return environment_pdf(scene.environment, direction);
     }
     return 0;
 }
@@ -148,8 +151,7 @@ VLP_HD inline float pdf_next_event(const SceneView&, const Light& light, Vec3 re
 // lamp. Lamps neither block nor reflect.
 template <typename F>
 VLP_HD inline void for_each_lamp_hit(const SceneView& scene, const Ray& ray, F&& f) {
-    for (uint32_t i = 0; i < scene.lamps.count; ++i) {
-        const uint32_t index = scene.lamps.lights[i];
+    for_each_lamp_near(scene.lamps, ray, [&](uint32_t index) {
         const Light& light = scene.lights[index];
         float t = 0;
         Vec3 normal = light.normal;
@@ -157,7 +159,7 @@ VLP_HD inline void for_each_lamp_hit(const SceneView& scene, const Ray& ray, F&&
                              ? area_intersect(light, ray, t)
                              : intersect_sphere_shape(light.position, light.radius, ray, t, normal);
         if (hit) f(index, t, ray.origin + t * ray.direction, normal);
-    }
+    });
 }
 
 // Calls f(light_index) for every infinite light that an escaping ray in `direction` sees: the environment and the suns

@@ -130,11 +130,46 @@ std::optional<Light> make_sphere(Vec3 center, float radius, Rgb radiance, uint32
     return light;
 }
 
-Light make_environment(Rgb radiance) {
+Light make_environment(Rgb mean_radiance) {
     Light light;
     light.kind = LightKind::environment;
-    light.radiance = radiance;
+    light.radiance = mean_radiance;
     return light;
+}
+
+EnvironmentTables make_environment_tables(std::span<const Rgb> texels, uint32_t width, uint32_t height) {
+    EnvironmentTables tables;
+    std::vector<double> in_row(width), rows(height);
+    double mean[3] = {0, 0, 0}, area = 0;
+    const auto at = [&](size_t x, size_t y) { return texels[y * width + x]; };
+    for (size_t y = 0; y < height; ++y) {
+        const double sin_theta = std::sin(k_pi_d * (static_cast<double>(y) + 0.5) / height);
+        const size_t below = y > 0 ? y - 1 : 0, above = std::min<size_t>(y + 1, height - 1);
+        double row = 0;
+        for (size_t x = 0; x < width; ++x) {
+            // What joining texels linearly leaves in this one: light of all its neighbours.
+            const size_t left = (x + width - 1) % width, right = (x + 1) % width;
+            double weight = 0;
+            for (const size_t j : {below, y, above}) {
+                weight += 0.25 *
+                          static_cast<double>(average(at(left, j)) + 2 * average(at(x, j)) + average(at(right, j))) *
+                          (j == y ? 2 : 1);
+            }
+            in_row[x] = weight;
+            row += weight;
+            mean[0] += sin_theta * static_cast<double>(at(x, y).r);
+            mean[1] += sin_theta * static_cast<double>(at(x, y).g);
+            mean[2] += sin_theta * static_cast<double>(at(x, y).b);
+            area += sin_theta;
+        }
+        rows[y] = row * sin_theta;
+        const std::vector<uint32_t> columns = make_distribution(in_row);
+        tables.columns_below.insert(tables.columns_below.end(), columns.begin(), columns.end());
+    }
+    tables.rows_below = make_distribution(rows);
+    tables.mean = {static_cast<float>(mean[0] / area), static_cast<float>(mean[1] / area),
+                   static_cast<float>(mean[2] / area)};
+    return tables;
 }
 
 float power(const Light& light, float scene_radius) {

@@ -23,7 +23,14 @@ std::optional<Light> make_area(const Affine& transform, Rgb power, float size_x,
 std::optional<Light> make_triangle(Vec3 v0, Vec3 v1, Vec3 v2, Rgb radiance, uint32_t instance, uint32_t primitive);
 std::optional<Light> make_sphere(Vec3 center, float radius, Rgb radiance, uint32_t instance, uint32_t primitive);
 
-Light make_environment(Rgb radiance);
+Light make_environment(Rgb mean_radiance);
+
+// Tables over the texels of an environment's picture (rows from the pole below), and its mean over all directions.
+struct EnvironmentTables {
+    std::vector<uint32_t> rows_below, columns_below;
+    Rgb mean;
+};
+EnvironmentTables make_environment_tables(std::span<const Rgb> texels, uint32_t width, uint32_t height);
 
 // Watts that leave the light, mean of the channels' sizes; for infinite lights what enters the scene's sphere.
 float power(const Light& light, float scene_radius);

@@ -14,7 +14,8 @@ struct Light {
     uint32_t visibility = 0;      // lamps: which rays see the shape
     uint32_t instance = k_none;   // triangle and sphere: the surface that emits
     uint32_t primitive = 0;
-    Rgb radiance;                 // point and spot of radius 0: intensity (W/sr); sun of angle 0: irradiance (W/m²)
+    Rgb radiance;                 // point and spot of radius 0: intensity (W/sr); sun of angle 0: irradiance (W/m²);
+                                  // environment: mean over all directions
     Vec3 position;                // point, spot, area: centre; sphere: centre in world space; triangle: first vertex
     Vec3 axis_u, axis_v;  // area: half sides, orthogonal; triangle: edges from the first vertex; spot: spot.h
     Vec3 normal;  // area, spot, sun: the direction of shining; triangle: unit geometric normal
@@ -26,10 +27,23 @@ struct Light {
     float spread_share = 1;  // area: of a Lambertian lamp's power, that the spread leaves
 };
 
+// A picture of the environment, row 0 at the pole below; `texels` null: constant radiance. See environment.h.
+struct EnvironmentView {
+    const Rgb* texels = nullptr;  // height rows of width
+    const uint32_t* rows_below = nullptr;     // Distribution over rows
+    const uint32_t* columns_below = nullptr;  // a Distribution over columns for each row
+    uint32_t width = 0, height = 0;
+    Vec3 to_image[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};  // rows of the rotation from the world to the picture
+};
+
+struct LampNode;
+
 // Lamps with a shape (radius or area), found by rays but not blocking them.
 struct LampView {
     const uint32_t* lights = nullptr;  // indices of such lamps
     uint32_t count = 0;
+    const LampNode* nodes = nullptr;  // see lamp_tree.h; null: a list
+    uint32_t root = 0;
 };
 
 }  // namespace vlp

@@ -76,6 +76,18 @@ void check_transform(const Affine& object_to_world) {
     if (!finite || !regular) fail("instance: transform is singular or not finite");
 }
 
+void check_world_image(std::span<const Rgb> texels, uint32_t width, uint32_t height) {
+    if (width == 0 || height == 0 || texels.size() != size_t{width} * height) {
+        throw std::invalid_argument("world: its picture has " + std::to_string(texels.size()) + " texels, must have " +
+                                    std::to_string(width) + " x " + std::to_string(height));
+    }
+    for (size_t i = 0; i < texels.size(); ++i) {
+        const Rgb c = texels[i];
+        if (is_finite(c) && c.r >= 0 && c.g >= 0 && c.b >= 0) continue;
+        throw std::invalid_argument("world: texel " + std::to_string(i) + " of its picture is negative or not finite");
+    }
+}
+
 void check_film(uint32_t width, uint32_t height, Window window) {
     const bool inside = static_cast<uint64_t>(window.x) + window.width <= width &&
                         static_cast<uint64_t>(window.y) + window.height <= height;

@@ -14,6 +14,7 @@ void check_mesh(std::span<const Vec3> positions, std::span<const Triangle> trian
 void check_spheres(std::span<const Vec3> centers, std::span<const float> radii, std::span<const int32_t> slots);
 void check_transform(const Affine& object_to_world);
 void check_indices(std::span<const int32_t> indices, size_t count, const char* what);
+void check_world_image(std::span<const Rgb> texels, uint32_t width, uint32_t height);
 void check_film(uint32_t width, uint32_t height, Window window);
 
 }  // namespace vlp

@@ -1,6 +1,7 @@
 // Collects datablocks, then makes what the passes read: the tree, emitters, the table of lights and the bounds.
 #include "scene/scene.h"
 
+#include <algorithm>
 #include <chrono>
 #include <stdexcept>
 #include <string>
@@ -8,7 +9,6 @@
 #include "bsdf/albedo_tables.h"
 #include "geometry/octahedral.h"
 #include "light/light.h"
-#include "light/light_build.h"
 #include "scene/input_checks.h"
 
 namespace vlp {
@@ -135,6 +135,16 @@ void Scene::add_lamp(Light light, uint32_t visibility) {
     ++info_.lamps;
 }
 
+void Scene::set_world_image(std::span<const Rgb> texels, uint32_t width, uint32_t height, const Vec3 (&to_image)[3]) {
+    require_open();
+    check_world_image(texels, width, height);
+    world_texels_.assign(texels.begin(), texels.end());
+    world_tables_ = make_environment_tables(texels, width, height);
+    world_ = world_tables_.mean;
+    world_view_.width = width, world_view_.height = height;
+    std::copy(std::begin(to_image), std::end(to_image), std::begin(world_view_.to_image));
+}
+
 void Scene::set_camera(const Camera& camera) {
     require_open();
     const uint32_t width = camera_.width, height = camera_.height;
@@ -167,7 +177,7 @@ void Scene::build(unsigned threads) {
         lights_.back().visibility = k_visible_to_camera;
     }
     collect_emitters();
-    make_light_tables();
+    make_light_tables(pool);
 
     view_ = view_placed(in_place);
     view_.geometries = geometry_views_.data();  // the passes' own copy, which lives as long as the scene
@@ -177,7 +187,8 @@ void Scene::build(unsigned threads) {
     }
     info_.instances = instances_.size();
     info_.bvh_bytes = bvh_.bytes();
-    info_.light_bytes = bytes_of(lights_) + bytes_of(light_choice_) + bytes_of(light_of_primitive_);
+    info_.light_bytes = bytes_of(lights_) + bytes_of(lamps_.nodes) + bytes_of(world_texels_) +
+                        bytes_of(world_tables_.columns_below) + bytes_of(light_choice_) + bytes_of(light_of_primitive_);
     info_.material_bytes = bytes_of(materials_) + bytes_of(lobes_) + bytes_of(material_of_slot_) + bytes_of(instances_);
     info_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     built_ = true;
@@ -197,7 +208,12 @@ SceneView Scene::view_placed(const Place& place) const {
     v.light_choice = {placed(light_choice_, place), static_cast<uint32_t>(light_choice_.size())};
     v.infinite_lights = placed(infinite_lights_, place);
     v.infinite_light_count = static_cast<uint32_t>(infinite_lights_.size());
-    v.lamps = {placed(lamps_, place), static_cast<uint32_t>(lamps_.size())};
+    v.lamps = {placed(lamps_.lights, place), static_cast<uint32_t>(lamps_.lights.size()),
+               lamps_.nodes.empty() ? nullptr : placed(lamps_.nodes, place), lamps_.root};
+    v.environment = world_view_;
+    v.environment.texels = placed(world_texels_, place);
+    v.environment.rows_below = placed(world_tables_.rows_below, place);
+    v.environment.columns_below = placed(world_tables_.columns_below, place);
     v.albedo_tables = placed(albedo_tables(), place);
     v.bvh = {placed(bvh_.nodes, place), placed(bvh_.triangle_blocks, place), placed(bvh_.sphere_blocks, place),
              placed(bvh_.instance_roots, place), bvh_.root};
@@ -269,15 +285,17 @@ void Scene::add_emitters_of(uint32_t index) {
     }
 }
 
-void Scene::make_light_tables() {
+void Scene::make_light_tables(ThreadPool& pool) {
     std::vector<double> powers;
     for (const Light& light : lights_) powers.push_back(static_cast<double>(power(light, radius_)));
     light_choice_ = make_distribution(powers);
+    std::vector<uint32_t> shapes;
     for (uint32_t i = 0; i < lights_.size(); ++i) {
         const Light& light = lights_[i];
         if (is_delta(light) || light.instance != k_none) continue;
-        (is_infinite(light) ? infinite_lights_ : lamps_).push_back(i);
+        (is_infinite(light) ? infinite_lights_ : shapes).push_back(i);
     }
+    lamps_ = build_lamp_tree(lights_, std::move(shapes), pool);
 }
 
 }  // namespace vlp

@@ -8,6 +8,8 @@
 #include "bvh/build.h"
 #include "core/parallel.h"
 #include "film/film.h"
+#include "light/lamp_tree_build.h"
+#include "light/light_build.h"
 #include "scene/material_build.h"
 #include "scene/scene_view.h"
 
@@ -28,6 +30,9 @@ public:
                       uint32_t visibility);
     void add_lamp(Light light, uint32_t visibility);
     void set_world(Rgb radiance) { world_ = radiance; }
+    // Instead of a constant: an equirectangular picture, `height` rows of `width` texels, row 0 at the pole below, and the
+    // rotation from the world to it.
+    void set_world_image(std::span<const Rgb> texels, uint32_t width, uint32_t height, const Vec3 (&to_image)[3]);
     void set_camera(const Camera& camera);  // all but the resolution, which set_film sets
     void set_film(uint32_t width, uint32_t height, Window window, bool transparent);
 
@@ -66,17 +71,21 @@ private:
     void require_open() const;
     void bound();
     void collect_emitters();
-    void make_light_tables();
+    void make_light_tables(ThreadPool& pool);
     void add_emitters_of(uint32_t instance);
 
     std::vector<Geometry> geometries_;
     std::vector<InstanceView> instances_;
     std::vector<Material> materials_;
     std::vector<Lobe> lobes_;
-    std::vector<uint32_t> material_of_slot_, light_of_primitive_, light_choice_, lamps_, infinite_lights_;
+    std::vector<uint32_t> material_of_slot_, light_of_primitive_, light_choice_, infinite_lights_;
     std::vector<Light> lights_;
+    LampTree lamps_;
     std::vector<GeometryView> geometry_views_;
     Rgb world_;
+    std::vector<Rgb> world_texels_;
+    EnvironmentTables world_tables_;
+    EnvironmentView world_view_;  // without arrays
     Vec3 center_;
     float radius_ = 1;
     Camera camera_;

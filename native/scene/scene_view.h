@@ -66,6 +66,7 @@ struct SceneView {
     const uint32_t* infinite_lights = nullptr;  // indices of the environment and the suns that are no delta lights
     uint32_t infinite_light_count = 0;
     BvhView bvh;                  // every surface
+    EnvironmentView environment;
     LampView lamps;               // the shapes of lamps, which rays pass through
     bool has_transparency = false;  // some material lets light pass straight through
     Camera camera;

@@ -179,7 +179,7 @@ class Renderer:
             self._native.add_film_state(np.ascontiguousarray(state, dtype=np.int64), iterations)
 
     def metadata(self) -> dict[str, Any]:
-        """What a file should say about the picture: version, settings, iterations, seconds and so on."""
+        """What a file should say about the picture: version, settings, iterations, their ranges, seconds, film."""
         from . import __version__
 
         statistics = asdict(self.statistics)

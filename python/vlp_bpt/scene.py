@@ -212,10 +212,23 @@ Light = PointLight | SpotLight | SunLight | AreaLight
 
 @dataclass
 class World:
-    """The environment: constant radiance (W / m² / sr) from every direction that nothing else fills."""
+    """The environment: radiance (W / m² / sr) from every direction that nothing else fills.
+
+    Constant, or `radiance` times an equirectangular `image`: (H, W, 3) linear, not negative, row 0 at the bottom (-z),
+    the direction (cos a, sin a, 0) at column (1/2 - a / 2 pi) W, as Blender's Environment Texture has it. `rotation`
+    (3, 3) turns directions of the world into those of the image.
+    """
 
     name: str = "World"
     radiance: Rgb = (0.0, 0.0, 0.0)
+    image: Float32 | None = None
+    rotation: Float32 = field(default_factory=lambda: np.eye(3, dtype=np.float32))
+
+    def __post_init__(self) -> None:
+        where = f"world '{self.name}'"
+        self.rotation = _arrays.float32(f"{where}: rotation", self.rotation, (3, 3))
+        if self.image is not None:
+            self.image = _arrays.float32(f"{where}: image", self.image, (None, None, 3))
 
 
 class Projection(IntEnum):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .errors import SceneError
-from .scene import AreaLight, Camera, Film, Float32, Light, Material, Mesh, PointLight, Scene, Spheres, SpotLight
+from .scene import AreaLight, Camera, Film, Float32, Light, Material, Mesh, PointLight, Scene, Spheres, SpotLight, World
 
 
 def upload(scene: Scene, native_scene: Any) -> None:
@@ -22,11 +22,19 @@ def upload(scene: Scene, native_scene: Any) -> None:
             native_scene.add_instance(geometry, instance.transform, materials, int(instance.visibility))
     for light in scene.lights:
         _add_light(light, native_scene)
-    native_scene.set_world(_rgb(scene.world.radiance))
+    _set_world(scene.world, native_scene)
     if scene.camera is None:
         raise SceneError("scene: has no camera")
     _set_camera(scene.camera, native_scene)
     _set_film(scene.film, native_scene)
+
+
+def _set_world(world: World, native_scene: Any) -> None:
+    if world.image is None or max(world.radiance) == 0:
+        native_scene.set_world(_rgb(world.radiance))
+    else:
+        texels = world.image * np.asarray(world.radiance, dtype=np.float32)
+        native_scene.set_world_image(np.ascontiguousarray(texels), np.ascontiguousarray(world.rotation))
 
 
 def _rgb(color: tuple[float, float, float]) -> tuple[float, float, float]:

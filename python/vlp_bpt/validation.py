@@ -28,6 +28,7 @@ from .scene import (
     Spheres,
     SpotLight,
     SunLight,
+    World,
 )
 
 MAX_SLOTS = 65536  # material slots of one geometry: 16 bits a primitive in the native core
@@ -53,7 +54,7 @@ def validate(scene: Scene) -> list[str]:
     _check_transforms(scene.instances)
     for light in scene.lights:
         _check_light(light, warnings)
-    _check_color(f"world '{scene.world.name}': radiance", scene.world.radiance)
+    _check_world(scene.world)
     if scene.camera is None:
         raise SceneError("scene: has no camera")
     _check_camera(scene.camera)
@@ -252,8 +253,26 @@ def has_area(light: AreaLight) -> bool:
     return bool(np.linalg.norm(np.cross(axes[:, 0], axes[:, 1])) > 0)
 
 
+def _check_world(world: World) -> None:
+    world.__post_init__()
+    where = f"world '{world.name}'"
+    _check_color(f"{where}: radiance", world.radiance)
+    rotation = world.rotation.astype(np.float64)
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4):
+        raise SceneError(f"{where}: rotation is none (its rows are not orthogonal unit vectors): {rotation.tolist()}")
+    if world.image is None:
+        return
+    if world.image.size == 0:
+        raise SceneError(f"{where}: image has no pixels (shape {world.image.shape})")
+    bad = ~(np.isfinite(world.image) & (world.image >= 0)).all(axis=2)
+    if bad.any():
+        row, column = np.argwhere(bad)[0]
+        value = world.image[row, column].tolist()
+        raise SceneError(f"{where}: image pixel ({column}, {row}) is negative or not finite: {value}")
+
+
 def _emits(scene: Scene) -> bool:
-    if max(scene.world.radiance) > 0:
+    if max(scene.world.radiance) > 0 and (scene.world.image is None or scene.world.image.any()):
         return True
     for light in scene.lights:
         strength = light.irradiance if isinstance(light, SunLight) else light.power

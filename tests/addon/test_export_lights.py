@@ -223,33 +223,92 @@ def test_negative_light_of_the_world_is_named() -> None:
     assert "World 'World'" in notes.warnings[0] and "negative" in notes.warnings[0]
 
 
-def environment(image: Any) -> Any:
+def environment(made: Any) -> Any:
+    """An Environment Texture that feeds the world's Background, of an image of 8 x 4 linear pixels."""
+    tree = made.node_tree
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    background = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBackground")
+    tree.links.new(node.outputs[0], scenes.socket(background, "Color"))
+    node.image = bpy.data.images.new("sky", 8, 4, float_buffer=True)
+    pixels = np.random.default_rng(1).random((4, 8, 4)).astype(np.float32)
+    node.image.pixels.foreach_set(pixels.ravel())
+    return node, pixels
+
+
+def test_a_world_image() -> None:
+    _, pixels = environment(world(Strength=2))
+    notes = Notes()
+    found = scenes.export(notes).world
+    assert notes.warnings == []
+    assert found.radiance == (1, 1, 1)
+    assert found.image == pytest.approx(2 * pixels[..., :3] * pixels[..., 3:])
+    assert (found.rotation == np.eye(3)).all()
+
+
+@pytest.mark.parametrize("kind", ["POINT", "TEXTURE", "VECTOR", "NORMAL"])
+def test_a_mapping_turns_the_world_image(kind: str) -> None:
     made = world()
-    texture = made.node_tree.nodes.new("ShaderNodeTexEnvironment")
-    texture.image = image
-    made.node_tree.links.new(texture.outputs[0], scenes.socket(background(made), "Color"))
-    return made
-
-
-def test_an_environment_image_is_its_mean_over_directions() -> None:
-    """White above a height of 30 degrees, which is a quarter of the directions but a third of the rows."""
-    image = bpy.data.images.new("sky", 4, 90, float_buffer=True)
-    pixels = np.zeros((90, 4, 4), np.float32)
-    pixels[60:] = 1
-    image.pixels.foreach_set(pixels.ravel())
-    environment(image)
+    node, _ = environment(made)
+    mapping = made.node_tree.nodes.new("ShaderNodeMapping")
+    mapping.vector_type = kind
+    scenes.socket(mapping, "Rotation").default_value = (0, 0, math.pi / 2)
+    coordinates = made.node_tree.nodes.new("ShaderNodeTexCoord")
+    generated = next(socket for socket in coordinates.outputs if socket.identifier == "Generated")
+    made.node_tree.links.new(generated, scenes.socket(mapping, "Vector"))
+    made.node_tree.links.new(mapping.outputs[0], scenes.socket(node, "Vector"))
     notes = Notes()
-    assert scenes.export(notes).world.radiance == pytest.approx([0.25] * 3, rel=1e-3)
-    assert "'sky'" in notes.warnings[0]
+    turned = scenes.export(notes).world.rotation @ (1, 0, 0)
+    assert notes.warnings == []
+    assert turned == pytest.approx((0, -1, 0) if kind == "TEXTURE" else (0, 1, 0), abs=1e-6)
 
 
-def test_a_missing_environment_image_is_named_with_its_file() -> None:
-    image = bpy.data.images.new("gone.hdr", 4, 4)
-    image.source, image.filepath = "FILE", "/nowhere/gone.hdr"
-    environment(image)
+def test_a_world_image_in_bytes_is_made_linear() -> None:
+    node, _ = environment(world())
+    node.image = bpy.data.images.new("bytes", 2, 1)
+    node.image.pixels.foreach_set(np.array([0, 0.5, 1, 1, 0.02, 0.2, 0.8, 1], np.float32))
+    found = scenes.export().world.image
+    assert found[0, 0] == pytest.approx((0, 0.2140, 1), abs=2e-3)
+    assert found[0, 1] == pytest.approx((0.0016, 0.0331, 0.6038), abs=2e-3)
+
+
+def test_a_missing_world_image_is_named_with_its_file() -> None:
+    node, _ = environment(world(Strength=2))
+    node.image = bpy.data.images.new("gone.hdr", 8, 4)
+    node.image.source, node.image.filepath = "FILE", "/nowhere/gone.hdr"
     notes = Notes()
-    scenes.export(notes)
+    assert scenes.export(notes).world.radiance == (2, 0, 2)  # magenta, as in Blender
     assert "World 'World'" in notes.warnings[0] and "/nowhere/gone.hdr" in notes.warnings[0]
+
+
+def test_a_world_without_its_image_is_magenta() -> None:
+    node, _ = environment(world())
+    node.image = None
+    notes = Notes()
+    assert scenes.export(notes).world.radiance == (1, 0, 1)
+    assert "no image" in notes.warnings[0]
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_world_images_are_added(alike: bool) -> None:
+    """Of one size and rotation texel by texel; else the second counts as its mean over directions."""
+    made = world(Strength=2)
+    _, pixels = environment(made)
+    tree = made.node_tree
+    other, second = tree.nodes.new("ShaderNodeTexEnvironment"), tree.nodes.new("ShaderNodeBackground")
+    other.image = bpy.data.images.new("other", 8, 4 if alike else 90, float_buffer=True)
+    white = np.zeros((other.image.size[1], 8, 4), np.float32)
+    white[2 * len(white) // 3 :] = 1  # above a height of 30 degrees
+    other.image.pixels.foreach_set(white.ravel())
+    both = tree.nodes.new("ShaderNodeAddShader")
+    tree.links.new(other.outputs[0], scenes.socket(second, "Color"))
+    tree.links.new(background(made).outputs[0], scenes.socket(both, "Shader"))
+    tree.links.new(second.outputs[0], scenes.socket(both, "Shader_001"))
+    tree.links.new(both.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    notes = Notes()
+    found = scenes.export(notes).world
+    first = 2 * pixels[..., :3] * pixels[..., 3:]
+    assert found.image == pytest.approx(first + (white[..., :3] if alike else 0.25), rel=1e-3)
+    assert len(notes.warnings) == (0 if alike else 1)
 
 
 def test_a_textured_world_is_reported_once() -> None:

@@ -140,6 +140,32 @@ def test_a_glowing_mesh(compare: Any) -> None:
     compare()
 
 
+@pytest.mark.parametrize("turn", [0.0, 1.0])
+def test_a_world_image(compare: Any, turn: float) -> None:
+    """Seen directly and by its light on a floor: a picture of noise with a bright spot, turned about two axes."""
+    floor()
+    camera = bpy.context.scene.camera
+    camera.data.type, camera.data.angle = "PERSP", 1.4
+    camera.location, camera.rotation_euler = (0, -3, 2), (1.35, 0, 0.3)
+    world = bpy.data.worlds.new("sky")
+    world.use_nodes = True
+    bpy.context.scene.world = world
+    tree = world.node_tree
+    picture = tree.nodes.new("ShaderNodeTexEnvironment")
+    mapping, coordinates = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    scenes.socket(mapping, "Rotation").default_value = (0.4 * turn, 0, turn)
+    generated = next(socket for socket in coordinates.outputs if socket.identifier == "Generated")
+    tree.links.new(generated, scenes.socket(mapping, "Vector"))
+    tree.links.new(mapping.outputs[0], scenes.socket(picture, "Vector"))
+    background = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBackground")
+    tree.links.new(picture.outputs[0], scenes.socket(background, "Color"))
+    pixels = np.random.default_rng(2).random((8, 16, 4)).astype(np.float32)
+    pixels[5, 4, :3] = 8
+    picture.image = bpy.data.images.new("sky", 16, 8, float_buffer=True)
+    picture.image.pixels.foreach_set(pixels.ravel())
+    compare()
+
+
 def test_the_world(compare: Any) -> None:
     floor()
     block, _ = scenes.material("block", "ShaderNodeBsdfDiffuse")

@@ -147,7 +147,9 @@ TEST(LightEmission, CarriesTheWattsAskedFor) {
         const double mean = sum / k_draws, error = std::sqrt(max_of(0.0, squares / k_draws - mean * mean) / k_draws);
         if (s.watts >= 0) {
             EXPECT_NEAR(mean, s.watts, 5 * error + 1e-4 * s.watts) << "seed " << k_seed;
-            EXPECT_NEAR(static_cast<double>(power(s.light, s.view.radius)), s.watts * 2 / 3, 1e-5 * s.watts);
+            // Of a picture, the power that lights are chosen by takes texels as even.
+            const double even = s.texels.empty() ? 1e-5 : 0.05;
+            EXPECT_NEAR(static_cast<double>(power(s.light, s.view.radius)), s.watts * 2 / 3, even * s.watts);
         } else {  // a stretched cone: by directions all around
             double lit = 0, lit_squares = 0;
             for (int i = 0; i < k_draws; ++i) {

@@ -146,7 +146,7 @@ TEST(LightChoice, WidthsAreExact) {
 TEST(LightChoice, TenThousandLamps) {
     Random random{k_seed};
     std::vector<Light> lights;
-    std::vector<uint32_t> lamps;
+    std::vector<uint32_t> shapes;
     std::vector<double> powers;
     const Vec3 receiver{0, 0, -3};
     double truth = 0;
@@ -155,7 +155,7 @@ TEST(LightChoice, TenThousandLamps) {
         const float watts = std::exp(4 * random.next());
         lights.push_back(make_point(p, rgb(watts), i % 2 ? 0.01f : 0.0f).value());
         powers.push_back(static_cast<double>(power(lights.back(), 10)));
-        if (i % 2) lamps.push_back(i);
+        if (i % 2) shapes.push_back(i);
         truth += static_cast<double>(watts * normalize(p - receiver).z / (4 * k_pi * length_squared(p - receiver)));
     }
     const std::vector<uint32_t> below = make_distribution(powers);
@@ -163,7 +163,7 @@ TEST(LightChoice, TenThousandLamps) {
     scene.lights = lights.data();
     scene.light_count = 10000;
     scene.light_choice = {below.data(), 10000};
-    scene.lamps = {lamps.data(), static_cast<uint32_t>(lamps.size())};
+    scene.lamps = {shapes.data(), static_cast<uint32_t>(shapes.size())};
     double sum = 0, squares = 0;
     constexpr int k_draws = 1000000;
     for (int i = 0; i < k_draws; ++i) {
@@ -176,7 +176,7 @@ TEST(LightChoice, TenThousandLamps) {
     const double mean = sum / k_draws, error = std::sqrt((squares / k_draws - mean * mean) / k_draws);
     EXPECT_NEAR(mean, truth, 5 * error + 1e-4 * truth) << "seed " << k_seed;
     for (int i = 0; i < 100; ++i) {
-        const uint32_t target = lamps[hash(k_seed, static_cast<uint32_t>(i)) % lamps.size()];
+        const uint32_t target = shapes[hash(k_seed, static_cast<uint32_t>(i)) % shapes.size()];
         bool found = false;
         const Ray ray{receiver, normalize(lights[target].position - receiver)};
         for_each_lamp_hit(scene, ray, [&](uint32_t light, float t, Vec3, Vec3) {

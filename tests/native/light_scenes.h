@@ -26,6 +26,8 @@ struct LightScene {
     double watts = 0;  // red channel of what leaves it or, if infinite, enters the scene's sphere
     uint32_t index = 0;
     SceneView view;
+    std::vector<Rgb> texels;  // of the environment's picture
+    EnvironmentTables tables;
 
     LightScene(std::string n, const std::optional<Light>& l, double w)
         : name(std::move(n)), light(l.value()), watts(w) {
@@ -39,12 +41,52 @@ struct LightScene {
         view.infinite_lights = &index;
         view.infinite_light_count = listed && is_infinite(light) ? 1 : 0;
         view.lamps = {&index, listed && !is_infinite(light) ? 1u : 0u};
+        if (!texels.empty()) {
+            view.environment.texels = texels.data();
+            view.environment.rows_below = tables.rows_below.data();
+            view.environment.columns_below = tables.columns_below.data();
+        }
         return view;
     }
 };
 
 inline constexpr Rgb k_power{3, 2, 1};
 inline constexpr Vec3 k_light_position{0.5f, -1.5f, 1.0f};
+
+// A picture of the environment: noise, a dark half, and a spot that holds most of the light; turned where asked.
+inline LightScene environment_picture(const char* name, uint32_t width, uint32_t height, bool turn) {
+    std::vector<Rgb> texels;
+    Random random{7};
+    for (uint32_t y = 0; y < height; ++y) {
+        for (uint32_t x = 0; x < width; ++x) {
+            const bool dark = 2 * x > width && 2 * y > height, spot = x == width / 4 && y == height / 3;
+            texels.push_back(k_power * (spot ? 50.0f : dark ? 0.0f : random.next()));
+        }
+    }
+    EnvironmentTables tables = make_environment_tables(texels, width, height);
+    LightScene s(name, make_environment(tables.mean), -1);
+    s.texels = std::move(texels), s.tables = std::move(tables);
+    s.view.environment.width = width, s.view.environment.height = height;
+    if (turn) {
+        const Frame f = make_frame(normalize(Vec3{0.3f, -0.5f, 0.8f}));
+        s.view.environment.to_image[0] = f.tangent;
+        s.view.environment.to_image[1] = f.bitangent;
+        s.view.environment.to_image[2] = f.normal;
+    }
+    // By midpoints much finer than the texels, times the disc that each direction comes through.
+    constexpr int k_steps = 400;
+    double sum = 0;
+    for (int i = 0; i < k_steps; ++i) {
+        for (int j = 0; j < k_steps; ++j) {
+            const float z = 2 * (static_cast<float>(i) + 0.5f) / k_steps - 1, r = safe_sqrt(1 - z * z);
+            const float angle = k_two_pi * (static_cast<float>(j) + 0.5f) / k_steps;
+            const Vec3 d{r * std::cos(angle), r * std::sin(angle), z};
+            sum += static_cast<double>(environment_radiance(s.scene().environment, s.light, d).r);
+        }
+    }
+    s.watts = sum * 4 * static_cast<double>(k_pi) / (k_steps * k_steps) * static_cast<double>(k_pi) * 16;
+    return s;
+}
 
 inline std::vector<LightScene> light_scenes() {
     const Vec3 o = k_light_position;
@@ -76,6 +118,9 @@ inline std::vector<LightScene> light_scenes() {
     s.emplace_back("triangle", make_triangle(v0, v1, v2, k_power, 3, 7), 3 * 2 * pi * triangle_area);
     s.emplace_back("sphere", make_sphere(o, 0.5f, k_power, 2, 5), 3 * 2 * pi * 4 * pi * 0.25);
     s.emplace_back("environment", make_environment(k_power), 3 * 4 * pi * disc);
+    s.push_back(environment_picture("picture", 8, 4, false));
+    s.push_back(environment_picture("picture_turned", 16, 9, true));
+    s.push_back(environment_picture("picture_of_few_rows", 5, 3, true));
     for (LightScene& l : s) {
         // The disc that light comes through faces each ray, not the sun's axis: 2 / (1 + cos) times the irradiance.
         if (l.light.kind == LightKind::sun) l.watts = 3 * disc * 2 / (1 + static_cast<double>(l.light.cos_outer));

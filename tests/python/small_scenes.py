@@ -71,7 +71,7 @@ def everything(seed: int = 1) -> Scene:
             SunLight("sun", transform(), (2, 2, 2), 0.01, Visibility.CAMERA),
             AreaLight("area", transform(), (3, 3, 3), (0.5, 0.25), True, 1.5, Visibility.CAMERA),
         ],
-        world=World("sky", (0.1, 0.2, 0.4)),
+        world=World("sky", (0.1, 0.2, 0.4), random.random((4, 8, 3)), [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]),  # type: ignore[arg-type]
         camera=Camera("cam", transform(), Projection.ORTHOGRAPHIC, 3, 2, (0.1, -0.2), 0.1, float("inf"), 0.01, 4),
         film=Film(64, 48, (3, 5, 20, 10), True),
     )

@@ -276,6 +276,18 @@ FAULTS: list[tuple[Callable[[Scene], object], str]] = [
         "area light 'L': transform has inf, must be finite",
     ),
     (
+        lambda s: setattr(s, "world", World("sky", (1, 1, 1), np.full((2, 3, 3), -0.5))),
+        r"world 'sky': image pixel (0, 0) is negative or not finite: [-0.5, -0.5, -0.5]",
+    ),
+    (
+        lambda s: setattr(s, "world", World("sky", (1, 1, 1), np.zeros((0, 3, 3)))),
+        "world 'sky': image has no pixels",
+    ),
+    (
+        lambda s: setattr(s, "world", World("sky", (1, 1, 1), np.ones((2, 3, 3)), 2 * np.eye(3))),
+        "world 'sky': rotation is none",
+    ),
+    (
         lambda s: setattr(s, "world", World("sky", (NAN, 0, 0))),
         "world 'sky': radiance nan must be finite and not negative",
     ),

@@ -56,6 +56,8 @@ def open_scene(blend: Path) -> Any:
     cycles.use_animated_seed = False
     cycles.pixel_filter_type, cycles.filter_width = "BLACKMAN_HARRIS", 1.5
     cycles.film_exposure = 1.0
+    for shown in bpy.data.objects:  # no grazing light is left out on smooth surfaces
+        shown.shadow_terminator_geometry_offset = shown.shadow_terminator_shading_offset = 0.0
     return scene
 
 

@@ -1,0 +1,57 @@
+// Boxes around the shapes of lamps, sorted by the builder that sorts those of surfaces.
+#include "light/lamp_tree_build.h"
+
+#include "bvh/binary.h"
+
+namespace vlp {
+
+namespace {
+
+// As wide as rounding in the tests of ray and shape may ask for.
+Box box_of(const Light& light) {
+    const auto reach = [&](float u, float v) { return light.radius + std::fabs(u) + std::fabs(v); };
+    const Vec3 half{reach(light.axis_u.x, light.axis_v.x), reach(light.axis_u.y, light.axis_v.y),
+                    reach(light.axis_u.z, light.axis_v.z)};
+    const float size =
+        max_of(std::fabs(light.position.x), max_of(std::fabs(light.position.y), std::fabs(light.position.z)));
+    const float slack = 1e-5f * (size + max_of(half.x, max_of(half.y, half.z)));
+    const Vec3 wide = half + Vec3{slack, slack, slack};
+    return {light.position - wide, light.position + wide};
+}
+
+uint32_t make_leaf(uint32_t begin, uint32_t end) {
+    return k_lamp_leaf | (end - begin - 1) << k_lamp_leaf_shift | begin;
+}
+
+}  // namespace
+
+LampTree build_lamp_tree(const std::vector<Light>& lights, std::vector<uint32_t> shapes, ThreadPool& pool) {
+    LampTree result;
+    if (shapes.size() <= k_max_lamps_in_leaf) {
+        result.lights = std::move(shapes);
+        return result;
+    }
+    std::vector<Ref> refs;
+    for (const uint32_t index : shapes) {
+        const Box box = box_of(lights[index]);
+        refs.push_back({box.low, k_none, box.high, index});
+    }
+    const BinaryTree tree = build_binary(refs, {k_max_lamps_in_leaf, 1.0f, nullptr}, k_lamp_tree_depth, pool);
+    for (const Ref& ref : refs) result.lights.push_back(ref.primitive);
+    result.root = tree.root;
+    result.nodes.resize(tree.nodes.size());
+    // Node i parts refs [begin, end) at i; at some indices there is none.
+    for (uint32_t i = 0; i < tree.nodes.size(); ++i) {
+        const BinaryNode& from = tree.nodes[i];
+        if (from.begin == from.end) continue;
+        LampNode& to = result.nodes[i];
+        const uint32_t begin[2] = {from.begin, i}, end[2] = {i, from.end};
+        for (uint32_t side = 0; side < 2; ++side) {
+            to.low[side] = from.box[side].low, to.high[side] = from.box[side].high;
+            to.child[side] = from.child[side] == k_leaf_flag ? make_leaf(begin[side], end[side]) : from.child[side];
+        }
+    }
+    return result;
+}
+
+}  // namespace vlp
