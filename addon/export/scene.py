@@ -43,12 +43,14 @@ def export_scene(
     render = scene.render
     width = render.resolution_x * render.resolution_percentage // 100 if width is None else width
     height = render.resolution_y * render.resolution_percentage // 100 if height is None else height
+    if render.use_motion_blur:
+        notes.warn(f"Scene '{scene.name}': motion blur is not there yet")
     exported = Scene(
         camera=export_camera(depsgraph, width, height, notes),
         film=Film(width, height, window, render.film_transparent),
-        world=export_world(scene.world, notes),
+        world=export_world(depsgraph.view_layer_eval.world_override or scene.world, notes),
     )
-    _Objects(exported, notes).add_all(depsgraph)
+    _Objects(exported, notes, depsgraph).add_all()
     return exported
 
 
@@ -65,19 +67,21 @@ class _Shown:
 class _Objects:
     """Adds the objects of a depsgraph to a scene, and remembers what was added for the instances to come."""
 
-    def __init__(self, scene: Scene, notes: Notes) -> None:
+    def __init__(self, scene: Scene, notes: Notes, depsgraph: bpy.types.Depsgraph) -> None:
         self.scene = scene
         self.notes = notes
+        self._depsgraph = depsgraph
+        self._override = depsgraph.view_layer_eval.material_override
         self._geometries: dict[tuple[str, int], int | None] = {}  # by type and pointer of evaluated data; None: empty
         self._materials: dict[int, int] = {}  # by pointer of an evaluated material, 0 for none
         self._shown: dict[tuple[int, int], _Shown | None] = {}  # by pointers of the original object and its data
 
-    def add_all(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def add_all(self) -> None:
         """Adds every object and instance. None of them is kept: they die as the iteration goes on."""
-        transforms = instance_transforms(depsgraph)
+        transforms = instance_transforms(self._depsgraph)
         # What is not a number is left in: an error that the scene's own check names.
         singular = is_singular(transforms) & np.isfinite(transforms).all(axis=(1, 2))
-        for index, instance in enumerate(depsgraph.object_instances):
+        for index, instance in enumerate(self._depsgraph.object_instances):
             if not instance.show_self:
                 continue
             shown = instance.object
@@ -90,7 +94,8 @@ class _Objects:
                 self.notes.warn(f"Object '{shown.name}': {MISSING_TYPES[shown.type]} are not there yet, left out")
 
     def _add_light(self, lamp: Any, matrix: Float32, hidden: bool) -> None:
-        visibility = Visibility(0) if hidden else _visibility(lamp)
+        visibility = Visibility(0) if hidden else self._visibility(lamp)
+        self._report_missing(lamp)
         light = export_light(lamp, matrix, visibility, self.notes)
         if light is not None:
             self.scene.lights.append(light)
@@ -114,11 +119,29 @@ class _Objects:
         geometry = self._geometry(shown)
         if geometry is None:
             return None
-        if not all(getattr(shown, name) for name in OTHER_VISIBILITY):
-            self.notes.warn(f"Object '{shown.name}': ray visibility other than to the camera is not there yet")
-        if shown.is_holdout:
-            self.notes.warn(f"Object '{shown.name}': holdouts are not there yet")
-        return _Shown(shown.name, geometry, self._material_slots(shown), _visibility(shown))
+        self._report_missing(shown)
+        return _Shown(shown.name, geometry, self._material_slots(shown), self._visibility(shown))
+
+    def _visibility(self, shown: Any) -> Visibility:
+        indirect_only = shown.original.indirect_only_get(view_layer=self._depsgraph.view_layer)
+        return Visibility.CAMERA if shown.visible_camera and not indirect_only else Visibility(0)
+
+    def _report_missing(self, shown: Any) -> None:
+        """Reports what an object asks for and is not there yet."""
+        linking = shown.light_linking
+        missing = {
+            "light linking": linking.receiver_collection is not None or linking.blocker_collection is not None,
+            "ray visibility other than to the camera": not all(getattr(shown, name) for name in OTHER_VISIBILITY),
+        }
+        if shown.type != "LIGHT":  # where these mean nothing, and a new one is a shadow catcher
+            missing |= {
+                "holdout": shown.original.holdout_get(view_layer=self._depsgraph.view_layer),
+                "particle hair": any(system.settings.render_type == "PATH" for system in shown.particle_systems),
+                "shadow catcher": shown.is_shadow_catcher,
+            }
+        for what, asked in missing.items():
+            if asked:
+                self.notes.warn(f"Object '{shown.name}': {what} is not there yet")
 
     def _geometry(self, shown: Any) -> int | None:
         """The index of an object's geometry in the scene, exported at the first sight of it."""
@@ -131,7 +154,9 @@ class _Objects:
         return self._geometries[key]
 
     def _material_slots(self, shown: Any) -> tuple[int, ...]:
-        """A scene material for each slot: linked to the object or to its data, at least one."""
+        """A scene material for each slot: the view layer's, or linked to the object or to its data, at least one."""
+        if self._override is not None:
+            return (self._material(self._override),)
         materials = list(shown.data.materials)
         for index, slot in enumerate(shown.material_slots):
             if slot.link == "OBJECT" or index >= len(materials):
@@ -156,10 +181,6 @@ def _exported(shown: Any) -> Mesh | Spheres | None:
         return None if mesh is None else export_mesh(mesh, shown.name)
     finally:
         shown.to_mesh_clear()
-
-
-def _visibility(shown: Any) -> Visibility:
-    return Visibility.CAMERA if shown.visible_camera else Visibility(0)
 
 
 def instance_transforms(depsgraph: bpy.types.Depsgraph) -> Float32:

@@ -118,8 +118,9 @@ class VLP_BPT_PT_statistics(_RenderPanel, bpy.types.Panel):
                     column.label(text=value, icon="ERROR")
                     continue
                 split = column.split(factor=0.4)
-                split.alignment = "RIGHT"
-                split.label(text=label)
+                name = split.row()
+                name.alignment = "RIGHT"
+                name.label(text=label)
                 split.label(text=value)
 
 

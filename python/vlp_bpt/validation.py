@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ from .scene import (
 MAX_SLOTS = 65536  # material slots of one geometry: 16 bits a primitive in the native core
 MAX_LOBES = 127  # lobes of one material: `layered_under` is 8 bits in the native core
 MAX_RESOLUTION = 65536
+_MOST_COORDINATE = 1e18  # squares of distances must not overflow float32
 # Of a transform's determinant: neither it nor its inverse may overflow float32.
 _LEAST_DETERMINANT, _MOST_DETERMINANT = 1e-36, 1e36
 
@@ -70,6 +71,7 @@ def _check_mesh(mesh: Mesh) -> None:
     mesh.__post_init__()  # a field may have been assigned since
     where = f"mesh '{mesh.name}'"
     _check_finite(f"{where}: positions", mesh.positions, "vertex")
+    _check_near(f"{where}: positions", mesh.positions, "vertex")
     _check_indices(f"{where}: triangles", mesh.triangles, len(mesh.positions), "triangle", "vertices")
     if mesh.corner_normals is not None:
         _check_finite(f"{where}: corner_normals", mesh.corner_normals, "triangle")
@@ -82,6 +84,7 @@ def _check_spheres(spheres: Spheres) -> None:
     spheres.__post_init__()
     where = f"spheres '{spheres.name}'"
     _check_finite(f"{where}: centers", spheres.centers, "sphere")
+    _check_near(f"{where}: centers", spheres.centers, "sphere")
     _check_finite(f"{where}: radii", spheres.radii, "sphere")
     if spheres.radii.size and np.min(spheres.radii) < 0:
         i = int(np.argmin(spheres.radii))
@@ -91,9 +94,19 @@ def _check_spheres(spheres: Spheres) -> None:
 
 def _check_finite(where: str, array: NDArray[np.float32], item: str) -> None:
     if not np.isfinite(array).all():
-        i = int(np.argmin(np.isfinite(array).reshape(len(array), -1).all(axis=1)))
-        values = ", ".join(f"{x:.6g}" for x in array[i].ravel())
-        raise SceneError(f"{where}: {item} {i} is ({values}), must be finite")
+        _fail_item(where, array, item, np.isfinite(array), "must be finite")
+
+
+def _check_near(where: str, array: NDArray[np.float32], item: str) -> None:
+    if array.size and max(float(np.max(array)), -float(np.min(array))) > _MOST_COORDINATE:
+        _fail_item(where, array, item, np.abs(array) <= _MOST_COORDINATE, f"must be within {_MOST_COORDINATE:g}")
+
+
+def _fail_item(where: str, array: NDArray[np.float32], item: str, good: NDArray[np.bool_], what: str) -> NoReturn:
+    """Names the first item that is not good in all its numbers."""
+    i = int(np.argmin(good.reshape(len(array), -1).all(axis=1)))
+    values = ", ".join(f"{x:.6g}" for x in array[i].ravel())
+    raise SceneError(f"{where}: {item} {i} is ({values}), {what}")
 
 
 def _check_indices(where: str, array: NDArray[np.int32], count: int, item: str, things: str) -> None:

@@ -206,3 +206,46 @@ def test_what_is_not_there_yet_is_named_once() -> None:
     assert not exported.instances
     assert sum("'hair'" in text for text in notes.warnings) == 1
     assert sum("'fog'" in text for text in notes.warnings) == 1
+
+
+def test_a_view_layer_replaces_materials_and_world() -> None:
+    own, override = bpy.data.materials.new("own"), bpy.data.materials.new("override")
+    shown = scenes.plane(own)
+    shown.data.materials.append(own)
+    shown.data.polygons[0].material_index = 1
+    layer = bpy.context.view_layer
+    layer.material_override = override
+    layer.world_override = bpy.data.worlds.new("sky")
+    exported = scenes.export()
+    assert [material.name for material in exported.materials] == ["override"]
+    assert exported.instances[0].materials == (0,)
+    assert exported.world.name == "sky"
+
+
+def test_a_collection_that_gives_indirect_light_only_is_hidden_from_the_camera() -> None:
+    collection = bpy.data.collections.new("indirect")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(bpy.data.objects.new("hidden", scenes.mesh()))
+    scenes.link("seen", scenes.mesh())
+    bpy.context.view_layer.layer_collection.children["indirect"].indirect_only = True
+    exported = scenes.export()
+    assert place(exported, "hidden").visibility == Visibility(0)
+    assert place(exported, "seen").visibility == Visibility.CAMERA
+
+
+def test_what_objects_ask_for_in_vain_is_named() -> None:
+    shown, lamp = scenes.link("shown", scenes.mesh()), scenes.light("POINT")
+    group = bpy.data.collections.new("group")
+    lamp.light_linking.receiver_collection = group
+    shown.is_shadow_catcher = shown.is_holdout = True
+    shown.visible_glossy = False
+    shown.modifiers.new("hair", "PARTICLE_SYSTEM")
+    shown.particle_systems[0].settings.type = "HAIR"
+    bpy.context.scene.render.use_motion_blur = True
+    notes = Notes()
+    scenes.export(notes)
+    for what in ("holdout", "particle hair", "ray visibility other than to the camera", "shadow catcher"):
+        assert f"Object 'shown': {what} is not there yet" in notes.warnings
+    assert "Object 'Point': light linking is not there yet" in notes.warnings
+    assert "Scene 'Scene': motion blur is not there yet" in notes.warnings
+    assert len(notes.warnings) == 6

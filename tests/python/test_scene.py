@@ -133,6 +133,10 @@ FAULTS: list[tuple[Callable[[Scene], object], str]] = [
         "mesh 'room': positions: vertex 5 is (1, inf, 1), must be finite",
     ),
     (
+        lambda s: s.geometries[0].positions.__setitem__((5, 1), -3e38),  # type: ignore[union-attr]
+        "mesh 'room': positions: vertex 5 is (1, -3e+38, 1), must be within 1e+18",
+    ),
+    (
         lambda s: s.geometries[0].triangles.__setitem__((3, 2), 8),  # type: ignore[union-attr]
         "mesh 'room': triangles: triangle 3 has index 8, but there are 8 vertices",
     ),
