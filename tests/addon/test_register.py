@@ -51,7 +51,7 @@ def test_a_mode_writes_what_it_stands_for(mode: Mode) -> None:
     shown.light_paths = 123
     shown.vlp_connections = 77
     shown.mode = mode.value
-    for name in ("light_path_length", "eye_path_length", "vlp_connections", "light_samples", "weighting"):
+    for name in ("light_path_length", "eye_path_length", "vlp_connections", "light_samples", "splats", "weighting"):
         assert getattr(shown, name) == getattr(preset, name), name
     assert shown.light_paths == 0
     shown.eye_path_length = 9  # and leaves what is changed afterwards
@@ -69,6 +69,8 @@ def test_each_setting_is_exported() -> None:
         "light_paths": 600,
         "vlp_connections": 2,
         "light_samples": 3,
+        "splats": False,
+        "hits": False,
         "weighting": "POWER",
         "filter": "GAUSSIAN",
         "filter_width": 2.5,
@@ -111,7 +113,7 @@ def test_panels_of_blender_that_fit_are_shown() -> None:
 
 def test_panels_of_this_addon_are_for_this_engine_alone() -> None:
     own = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("VLP_BPT_PT")]
-    assert len(own) == 7
+    assert len(own) == 8
     assert all({"VLP_BPT"} == panel.COMPAT_ENGINES for panel in own)
 
 
