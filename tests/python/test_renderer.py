@@ -82,7 +82,7 @@ def test_settings_go_resolved(fake: Any) -> None:
         1,
         192,
     )
-    assert all(type(value) in (str, int, float) for value in sent.values())
+    assert all(type(value) in (str, int, float, bool) for value in sent.values())
 
 
 # The flow of a render
