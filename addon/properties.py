@@ -55,7 +55,7 @@ def preset(mode: str) -> dict[str, Any]:
     except core.CoreMissing:
         return {}
     values = settings.MODE_PRESETS[settings.Mode(mode)]
-    names = ("light_path_length", "eye_path_length", "vlp_connections", "light_samples", "splats", "weighting")
+    names = [name for name in settings.FROM_MODE if name != "light_paths"]
     # Enums as plain text: Blender does not take a StrEnum.
     return {name: getattr(values, name) for name in names} | {"weighting": values.weighting.value, "light_paths": 0}
 
@@ -70,6 +70,7 @@ _DEFAULTS = {
     "light_path_length": 3,
     "eye_path_length": 8,
     "vlp_connections": 1,
+    "vlp_candidates": 1,
     "light_samples": 1,
     "splats": True,
     "weighting": "BALANCE",
@@ -139,6 +140,15 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
         max=1024,
         soft_max=16,
     )
+    vlp_candidates: bpy.props.IntProperty(
+        name="Candidates",
+        description="From how many virtual light points each one is chosen, the brighter the likelier: less noise from "
+        "those that are far away or turned aside, for a little more time",
+        default=_DEFAULTS["vlp_candidates"],
+        min=1,
+        max=1024,
+        soft_max=32,
+    )
     light_samples: bpy.props.IntProperty(
         name="Lamps per Hit",
         description="How many points on lamps light each surface that the camera sees (the paper's M_s): softer "
@@ -165,6 +175,24 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
         description="Light can be found from the camera, from the lamps, or halfway: how the finds are averaged",
         items=WEIGHTINGS,
         default=_DEFAULTS["weighting"],
+    )
+    clamp_direct: bpy.props.FloatProperty(
+        name="Clamp Direct",
+        description="The most that one sample of light from a lamp, seen or after one surface, may add to a pixel. "
+        "Removes bright specks, and the light that they stand for. Zero: no limit",
+        default=0.0,
+        min=0.0,
+        max=1e9,
+        soft_max=100.0,
+    )
+    clamp_indirect: bpy.props.FloatProperty(
+        name="Clamp Indirect",
+        description="The most that one sample of light after two surfaces or more may add to a pixel. Removes bright "
+        "specks, and the light that they stand for: indirect light and caustics get darker. Zero: no limit",
+        default=0.0,
+        min=0.0,
+        max=1e9,
+        soft_max=100.0,
     )
     filter: bpy.props.EnumProperty(
         name="Pixel Filter",

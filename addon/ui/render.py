@@ -52,9 +52,13 @@ class VLP_BPT_PT_light_paths(_RenderPanel, bpy.types.Panel):
         column.prop(settings, "light_paths")
         hits = column.column(align=True)
         hits.prop(settings, "vlp_connections")
+        hits.prop(settings, "vlp_candidates")
         hits.prop(settings, "light_samples")
         column.separator()
         column.prop(settings, "splats")
+        clamps = column.column(align=True)
+        clamps.prop(settings, "clamp_direct")
+        clamps.prop(settings, "clamp_indirect")
 
 
 class VLP_BPT_PT_strategies(_RenderPanel, bpy.types.Panel):

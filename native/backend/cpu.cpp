@@ -154,7 +154,7 @@ private:
         uint64_t dropped = 0;
         for (uint32_t y = tile.y * k_tile; y < y_end; ++y) {
             for (uint32_t x = tile.x * k_tile; x < x_end; ++x) {
-                PixelSink sink;
+                PixelSink sink{pass_};
                 const float alpha = trace_eye_path(scene_, pass_, cache, iteration, window.x + x, window.y + y, sink);
                 dropped += sink.dropped;
                 const Rgb c = sink.radiance;

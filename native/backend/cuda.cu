@@ -49,7 +49,7 @@ __global__ void eye_pass(SceneView scene, PassSettings pass, LightVertexCache ca
     const uint32_t pixel = first_pixel + blockIdx.x * blockDim.x + threadIdx.x;
     if (pixel >= end_pixel) return;
     const uint32_t x = window.x + pixel % window.width, y = window.y + pixel / window.width;
-    PixelSink sink;
+    PixelSink sink{pass};
     const float alpha = trace_eye_path(scene, pass, cache, iteration, x, y, sink);
     if (sink.dropped > 0) atomicAdd(dropped, static_cast<unsigned long long>(sink.dropped));
     frame[pixel] = {{sink.radiance.r, sink.radiance.g, sink.radiance.b, alpha}};

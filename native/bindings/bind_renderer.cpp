@@ -41,11 +41,14 @@ PassSettings pass_of(const nb::dict& settings, bool transparent_film) {
     pass.eye_path_length = get<uint32_t>(settings, "eye_path_length");
     pass.light_paths = get<uint32_t>(settings, "light_paths");
     pass.vlp_connections = get<uint32_t>(settings, "vlp_connections");
+    pass.vlp_candidates = get<uint32_t>(settings, "vlp_candidates");
     pass.light_samples = get<uint32_t>(settings, "light_samples");
     pass.splats = get<bool>(settings, "splats");
     pass.hits = get<bool>(settings, "hits");
     pass.weighting = weighting_of(get<std::string>(settings, "weighting"));
     pass.roulette = get<std::string>(settings, "mode") == "REFERENCE";
+    pass.clamp_direct = get<float>(settings, "clamp_direct");
+    pass.clamp_indirect = get<float>(settings, "clamp_indirect");
     pass.transparent_film = transparent_film;
     pass.seed = get<uint32_t>(settings, "seed");
     pass.filter = filter_of(get<std::string>(settings, "filter"));
@@ -53,6 +56,7 @@ PassSettings pass_of(const nb::dict& settings, bool transparent_film) {
     if (!(pass.filter_width > 0) || !is_finite(pass.filter_width)) {
         throw std::invalid_argument("setting filter_width: " + std::to_string(pass.filter_width) + " must be above 0");
     }
+    if (pass.vlp_candidates == 0) throw std::invalid_argument("setting vlp_candidates must be at least 1");
     if (pass.light_path_length > k_max_walk || pass.eye_path_length > k_max_walk || pass.eye_path_length == 0) {
         throw std::invalid_argument(
             "settings light_path_length and eye_path_length must be at most 64, the latter at least 1");

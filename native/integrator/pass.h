@@ -19,20 +19,32 @@ struct PassSettings {
     uint32_t eye_path_length = 5;    // K: most surface hits of an eye path, at most k_max_walk
     uint32_t light_paths = 0;        // N
     uint32_t vlp_connections = 1;    // C
+    uint32_t vlp_candidates = 1;     // M: VLPs that each connection chooses from
     uint32_t light_samples = 1;      // S
     bool splats = false;             // joins light paths to the lens; wants L and N above 0
     bool hits = true;                // counts lights that the eye walk itself meets
     Weighting weighting = Weighting::balance;
     bool roulette = false;           // ends walks at random by their throughput instead of at a fixed length
+    float clamp_direct = 0,
+          clamp_indirect = 0;  // most that one find adds to a pixel (mean of its channels), 0: no limit
     bool transparent_film = false;   // the camera sees no background
     uint32_t seed = 0;
-    float kappa = 0;  // C N / V, V being what a pilot pass of the scene stored: how often a VLP is drawn
+    float kappa = 0;  // C M N / V, V being what a pilot pass of the scene stored: how often a VLP is drawn
     Filter filter = Filter::blackman_harris;
     float filter_width = 1.5f;  // full width (pixels)
+
+    // The limit on what a path of n vertices adds: direct light has met one surface at most.
+    VLP_HD float clamp_of(uint32_t n) const { return n <= 3 ? clamp_direct : clamp_indirect; }
 
     // Whether an iteration has a light pass.
     bool traces_light() const { return kappa > 0 || splats; }
 };
+
+// What one find adds to a pixel, made as dim as the settings ask: a bias against bright specks.
+VLP_HD inline Rgb clamped(const PassSettings& pass, uint32_t n, Rgb light) {
+    const float most = pass.clamp_of(n), size = average(light);
+    return most > 0 && size > most ? light * (most / size) : light;
+}
 
 // The virtual light points of one iteration. Path p keeps its hits y1 ... yL in slots [p L, p L + L); `stored` lists the
 // slots that can be connected, in that order.

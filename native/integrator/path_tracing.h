@@ -25,7 +25,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
     Anchor from{};
     const bool has_vlps = pass.kappa > 0 && cache.stored_count > 0 && pass.vlp_connections > 0;
     // Every step draws from dimensions of its own, so that a path's later draws do not shift with its earlier ones.
-    const uint32_t draws_per_step = 4 + 2 * pass.light_samples + pass.vlp_connections;
+    const uint32_t draws_per_step = 4 + 2 * pass.light_samples + 2 * pass.vlp_connections;
 
     for (uint32_t hits = 1; hits <= pass.eye_path_length; ++hits) {
         sampler.dimension = 2 + (hits - 1) * draws_per_step;
@@ -70,7 +70,9 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
                 sink.add(c);
             }
             for (uint32_t i = 0; has_vlps && i < pass.vlp_connections; ++i) {
-                Contribution c = connect_virtual_light_point(scene, pass, cache, eye, bsdf, sampler.next_bits());
+                const uint32_t u_vlp = sampler.next_bits();
+                const float u_keep = pass.vlp_candidates > 1 ? sampler.next() : 0.0f;
+                Contribution c = connect_virtual_light_point(scene, pass, cache, eye, bsdf, u_vlp, u_keep);
                 c.value *= 1.0f / static_cast<float>(pass.vlp_connections);
                 sink.add(c);
             }
@@ -98,13 +100,14 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
 
 // Sums up what a pixel's path finds, leaving out estimates that are not finite.
 struct PixelSink {
-    Rgb radiance;
+    const PassSettings& pass;
+    Rgb radiance{};
     uint32_t dropped = 0;
 
     VLP_HD void add(const Contribution& c) {
         const Rgb weighted = c.value * c.weight;
         if (is_finite(weighted)) {
-            radiance += weighted;
+            radiance += clamped(pass, c.s + c.t, weighted);
         } else {
             ++dropped;
         }

@@ -102,7 +102,8 @@ struct SplatSink {
             0x1p62f / (static_cast<float>(pass.light_paths) * static_cast<float>(pass.light_path_length));
         for_each_pixel(pass, window, splat.film, [&](uint32_t x, uint32_t y, float h) {
             ExactSum* pixel = sums + 3 * (static_cast<size_t>(y - window.y) * window.width + (x - window.x));
-            const float rgb[3] = {weighted.r * h, weighted.g * h, weighted.b * h};
+            const Rgb share = clamped(pass, splat.found.s + 1, weighted * h);
+            const float rgb[3] = {share.r, share.g, share.b};
             for (int c = 0; c < 3; ++c) {
                 if (rgb[c] > 0) add_shared(pixel[c], exact(rgb[c], most), fetch_add);
             }

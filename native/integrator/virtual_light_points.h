@@ -55,32 +55,65 @@ VLP_HD inline float connection_weight(const PassSettings& pass, const EyeWalk& e
     return sum.weight();
 }
 
-// Draws one of the V stored VLPs evenly and estimates what all of an iteration's bring to z_{t-1}; the caller averages
-// over its C draws. One draw stands for V VLPs of N paths.
-VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, const PassSettings& pass,
-                                                       const LightVertexCache& cache, const EyeWalk& eye,
-                                                       const Bsdf& eye_bsdf, uint32_t u) {
-    const uint64_t draw = (static_cast<uint64_t>(u) * cache.stored_count) >> 32;
-    const LightVertex* vlp = cache.slots + cache.stored[draw];
-    Contribution found{.s = vlp->index() + 1, .t = eye.t, .vlp = vlp};
+// A connection of z_{t-1} to a VLP, as long as nothing stands between them.
+struct VlpConnection {
+    Contribution found;
+    Anchor vlp;
+    Vec3 direction;  // unit, to it
+};
+
+// Stored VLP number `index` as if it stood for all V of an iteration.
+VLP_HD inline VlpConnection join_unshadowed(const SceneView& scene, const PassSettings& pass,
+                                            const LightVertexCache& cache, const EyeWalk& eye, const Bsdf& eye_bsdf,
+                                            uint32_t index) {
+    const LightVertex* vlp = cache.slots + cache.stored[index];
     const SurfacePoint point = surface_of(*vlp);
     const Edge edge = edge_between(eye.surface.position, point.position);
+    VlpConnection joined{{.s = vlp->index() + 1, .t = eye.t, .vlp = vlp}, anchor_of(point), edge.direction};
+    Contribution& found = joined.found;
     const float cos_eye = abs_dot(eye.surface.geometric_normal, edge.direction);
     const float cos_vlp = abs_dot(point.geometric_normal, edge.direction);
     const float geometry = cos_eye * cos_vlp / edge.dist_squared;
-    if (!(geometry > 0) || !is_finite(geometry)) return found;
+    if (!(geometry > 0) || !is_finite(geometry)) return joined;
 
     const LobeValue at_eye = evaluate(eye_bsdf, eye.w_eye, edge.direction);
-    if (is_black(at_eye.f)) return found;
+    if (is_black(at_eye.f)) return joined;
     const LobeValue at_vlp = evaluate(make_bsdf(scene, point), -edge.direction, decode(vlp->to_previous));
-    if (is_black(at_vlp.f)) return found;
+    if (is_black(at_vlp.f)) return joined;
 
-    const Rgb through = transmittance(scene, anchor_of(eye.surface), anchor_of(point), edge.direction);
-    if (is_black(through)) return found;
     const float vlps_per_path = static_cast<float>(cache.stored_count) / static_cast<float>(pass.light_paths);
-    found.value = eye.throughput * at_eye.f * at_vlp.f * vlp->throughput * through * (geometry * vlps_per_path);
+    found.value = eye.throughput * at_eye.f * at_vlp.f * vlp->throughput * (geometry * vlps_per_path);
     found.weight = connection_weight(pass, eye, at_eye, vlp, at_vlp, edge, cos_eye, cos_vlp);
-    return found;
+    return joined;
+}
+
+// One of the C connections at z_{t-1}: of M candidates, drawn evenly over the V stored VLPs, one is kept in proportion to the
+// light that it would bring if nothing stood between (Talbot, Cline & Egbert 2005), and a ray is sent to that one. The
+// estimate is of what all VLPs of an iteration bring; the caller averages over C. One candidate stands for V VLPs of
+// N paths, and the one that is kept for all M.
+VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, const PassSettings& pass,
+                                                       const LightVertexCache& cache, const EyeWalk& eye,
+                                                       const Bsdf& eye_bsdf, uint32_t u, float u_keep) {
+    const uint32_t candidates = pass.vlp_candidates;
+    VlpConnection kept{{.t = eye.t}, {}, {}};
+    float kept_light = 0, light = 0;
+    for (uint32_t i = 0; i < candidates; ++i) {
+        const uint64_t stratum = ((static_cast<uint64_t>(i) << 32) + u) / candidates;
+        const uint64_t index = (stratum * cache.stored_count) >> 32;
+        const VlpConnection next = join_unshadowed(scene, pass, cache, eye, eye_bsdf, static_cast<uint32_t>(index));
+        const float next_light = average(next.found.value * next.found.weight);
+        if (!is_finite(next_light)) return next.found;  // for the sink to count
+        if (!(next_light > 0)) continue;
+        light += next_light;
+        const float chance = next_light / light;
+        const bool keep = u_keep < chance;
+        u_keep = keep ? u_keep / chance : (u_keep - chance) / (1 - chance);
+        if (keep) kept = next, kept_light = next_light;
+    }
+    if (!(kept_light > 0)) return kept.found;
+    const Rgb through = transmittance(scene, anchor_of(eye.surface), kept.vlp, kept.direction);
+    kept.found.value *= through * (light / (kept_light * static_cast<float>(candidates)));
+    return kept.found;
 }
 
 }  // namespace vlp

@@ -18,7 +18,7 @@
 
 namespace vlp {
 
-// How often an iteration draws strategy (s, t) for a pixel: hits once, S light samples, kappa connections to a virtual light
+// How often an iteration draws strategy (s, t) for a pixel: hits once, S light samples, kappa draws of a virtual light
 // point, and N light paths of which each may splat on it. 0: it is switched off.
 VLP_HD inline float strategy_count(const PassSettings& pass, uint32_t s, uint32_t t) {
     if (t == 1) return pass.splats ? static_cast<float>(pass.light_paths) : 0.0f;

@@ -28,7 +28,7 @@ PassSettings for_scene(const SceneView& scene, PassSettings pass) {
     pass.kappa = 0;
     if (pass.vlp_connections > 0 && light_walks) {
         const float vlps_per_path = pilot_vlps_per_path(scene, pass);
-        if (vlps_per_path > 0) pass.kappa = static_cast<float>(pass.vlp_connections) / vlps_per_path;
+        if (vlps_per_path > 0) pass.kappa = static_cast<float>(pass.vlp_connections * pass.vlp_candidates) / vlps_per_path;
     }
     return pass;
 }

@@ -58,6 +58,7 @@ class ModePreset:
     light_path_length: int
     eye_path_length: int
     vlp_connections: int
+    vlp_candidates: int
     light_samples: int
     splats: bool
     weighting: Weighting
@@ -65,9 +66,9 @@ class ModePreset:
 
 
 MODE_PRESETS: dict[Mode, ModePreset] = {
-    Mode.PAPER: ModePreset(1, 5, 1, 1, False, Weighting.UNIFORM, light_vertices=1 << 23),
-    Mode.BALANCED: ModePreset(3, 8, 1, 1, True, Weighting.BALANCE, light_vertices=1 << 23),
-    Mode.REFERENCE: ModePreset(64, 64, 1, 1, True, Weighting.BALANCE, light_vertices=1 << 21),
+    Mode.PAPER: ModePreset(1, 5, 1, 1, 1, False, Weighting.UNIFORM, light_vertices=1 << 23),
+    Mode.BALANCED: ModePreset(3, 8, 1, 1, 1, True, Weighting.BALANCE, light_vertices=1 << 23),
+    Mode.REFERENCE: ModePreset(64, 64, 1, 1, 1, True, Weighting.BALANCE, light_vertices=1 << 21),
 }
 
 # The least and the most that a number may be, both allowed.
@@ -78,14 +79,17 @@ RANGES: dict[str, tuple[float, float]] = {
     "eye_path_length": (1, 64),
     "light_paths": (0, 2**26),
     "vlp_connections": (0, 1024),
+    "vlp_candidates": (1, 1024),
     "light_samples": (0, 1024),
+    "clamp_direct": (0.0, 1e9),
+    "clamp_indirect": (0.0, 1e9),
     "filter_width": (0.01, 10.0),
     "threads": (0, 1024),
     "seed": (0, 2**32 - 1),
 }
 
 _ENUMS: dict[str, type[StrEnum]] = {"mode": Mode, "weighting": Weighting, "filter": Filter, "device": Device}
-_REALS = ("time_limit", "filter_width")
+_REALS = ("time_limit", "clamp_direct", "clamp_indirect", "filter_width")
 _SWITCHES = ("splats", "hits")
 _ON_OFF = {"on": True, "true": True, "yes": True, "1": True, "off": False, "false": False, "no": False, "0": False}
 # What a mode decides where it is None.
@@ -94,6 +98,7 @@ FROM_MODE = (
     "eye_path_length",
     "light_paths",
     "vlp_connections",
+    "vlp_candidates",
     "light_samples",
     "splats",
     "weighting",
@@ -106,8 +111,12 @@ class RenderSettings:
 
     samples: iterations. time_limit: seconds, 0 for none. light_path_length: L, most surface hits of a light path.
     eye_path_length: K, most surface hits of an eye path. light_paths: N, light paths of one iteration (0: chosen from
-    the picture's size). vlp_connections: C, virtual light points joined to one eye vertex. light_samples: S, light
-    samples at one eye vertex. splats: light paths are joined to the lens. hits: eye paths that meet a light count.
+    the picture's size). vlp_connections: C, virtual light points joined to one eye vertex. vlp_candidates:
+    M, how many each of them is chosen from, by the light that it would bring if nothing stood between. light_samples:
+    S, light samples at one eye vertex. splats: light paths are joined to the lens. hits: eye paths that meet a light
+    count.
+    clamp_direct, clamp_indirect: the most that one find of light after at most one surface, or after more, may add to
+    a pixel (mean of its channels); 0: no limit. Clamping removes bright specks and the light in them: it is a bias.
     threads: 0 for all.
 
     C = 0, S = 0, splats and hits switch strategies off. Those that are left share the light that they can find, and
@@ -121,10 +130,13 @@ class RenderSettings:
     eye_path_length: int | None = None
     light_paths: int | None = None
     vlp_connections: int | None = None
+    vlp_candidates: int | None = None
     light_samples: int | None = None
     splats: bool | None = None
     hits: bool = True
     weighting: Weighting | None = None
+    clamp_direct: float = 0.0
+    clamp_indirect: float = 0.0
     filter: Filter = Filter.BLACKMAN_HARRIS
     filter_width: float = 1.5
     device: Device = Device.AUTO
@@ -186,6 +198,7 @@ class ResolvedSettings(RenderSettings):
     eye_path_length: int = 1
     light_paths: int = 1
     vlp_connections: int = 1
+    vlp_candidates: int = 1
     light_samples: int = 1
     splats: bool = True
     weighting: Weighting = Weighting.BALANCE

@@ -44,6 +44,7 @@ def test_what_is_set_stays(mode: Mode) -> None:
         "vlp_connections": 0,
         "light_samples": 4,
         "splats": mode is Mode.PAPER,
+        "vlp_candidates": 3,
         "weighting": Weighting.POWER,
     }
     assert values.keys() == set(FROM_MODE)

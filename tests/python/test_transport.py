@@ -102,6 +102,8 @@ CHANGES: dict[str, dict[str, Any]] = {
     "N1": {"light_paths": 1, "samples": 1500},  # few light paths are skewed: more iterations
     "N64": {"light_paths": 64},
     "C3": {"vlp_connections": 3},
+    "M4": {"vlp_candidates": 4},
+    "C2_M3": {"vlp_connections": 2, "vlp_candidates": 3},
     "S4": {"light_samples": 4},
     "C3_S4_N64": {"light_paths": 64, "vlp_connections": 3, "light_samples": 4},
     "uniform": {"weighting": "UNIFORM"},
@@ -145,16 +147,17 @@ def test_many_lights_and_mirrors(change: dict[str, Any]) -> None:
     assert_same_mean(pictures, many_lights_by_paths(), f"many lights, {change}")
 
 
-@pytest.mark.parametrize("connections", [1, 3])
+@pytest.mark.parametrize(("connections", "candidates"), [(1, 1), (3, 1), (2, 4)])
 @pytest.mark.parametrize("L", [1, 4])
-def test_kappa_counts_connections_of_a_virtual_light_point(L: int, connections: int) -> None:
-    """kappa = C N / V, V by a pilot pass of its own: within four standard deviations of what an iteration stores."""
+def test_kappa_counts_draws_of_a_virtual_light_point(L: int, connections: int, candidates: int) -> None:
+    """kappa = C M N / V, V by a pilot pass of its own: within four standard deviations of what an iteration stores."""
     N = 20_000
-    renderer = Renderer(lit_by_area(), settings(light_path_length=L, vlp_connections=connections, light_paths=N))
+    options = {"light_path_length": L, "vlp_connections": connections, "vlp_candidates": candidates}
+    renderer = Renderer(lit_by_area(), settings(light_paths=N, **options))
     renderer.iterate(1)
     per_path = renderer.statistics.vlps / N
     deviation = 0.5 * L / 4096**0.5  # of the pilot's mean; what a path stores lies in [0, L]
-    assert connections / renderer._native.kappa == pytest.approx(per_path, abs=4 * deviation)
+    assert connections * candidates / renderer._native.kappa == pytest.approx(per_path, abs=4 * deviation)
 
 
 def test_weights_prefer_the_better_strategy() -> None:
@@ -168,6 +171,29 @@ def test_weights_prefer_the_better_strategy() -> None:
     print({w: round(float(n), 4) for w, n in noise.items()})
     assert noise["BALANCE"] < 0.6 * noise["UNIFORM"]
     assert noise["POWER"] < 0.6 * noise["UNIFORM"]
+
+
+def test_candidates_are_kept_by_their_light() -> None:
+    """The same light with less noise, where connections alone find it."""
+    options = {"light_samples": 0, "hits": False, "splats": False, "light_paths": 500, "samples": 64}
+    few, many = (batches(lit_by_area(), settings(vlp_candidates=m, **options), 12) for m in (1, 8))
+    assert_same_mean(blocks(few), blocks(many), "M = 1, M = 8")
+    assert many.std(axis=0, ddof=1).mean() < 0.7 * few.std(axis=0, ddof=1).mean()
+
+
+@pytest.mark.parametrize("strategies", [{}, {"light_samples": 0}, {"splats": False, "vlp_connections": 0}])
+def test_clamps_bound_what_is_indirect_or_direct(strategies: dict[str, Any]) -> None:
+    """A limit that nothing reaches changes no bit; a low one keeps the other kind of light as it was."""
+    scene = lit_by_area()
+    options = {"samples": 32, "light_paths": 500, "light_path_length": 2, "eye_path_length": 4, "seed": 3, **strategies}
+    free = render(scene, settings(**options))
+    assert (render(scene, settings(clamp_direct=1e6, clamp_indirect=1e6, **options)) == free).all()
+    direct = {"eye_path_length": 2 if strategies.get("light_samples") == 0 else 1, "light_path_length": 1}
+    alone = settings(**options | direct | {"vlp_connections": 0})
+    dark = render(scene, settings(clamp_indirect=1e-9, **options))
+    assert render(scene, settings(clamp_direct=1e-9, clamp_indirect=1e-9, **options))[..., :3].max() < 1e-6
+    assert dark[..., :3].mean() < 0.97 * free[..., :3].mean()
+    assert dark[..., :3].mean() == pytest.approx(render(scene, alone)[..., :3].mean(), rel=0.03)
 
 
 def test_world_and_lamps_add_up() -> None:
