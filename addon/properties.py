@@ -55,7 +55,7 @@ def preset(mode: str) -> dict[str, Any]:
     except core.CoreMissing:
         return {}
     values = settings.MODE_PRESETS[settings.Mode(mode)]
-    names = ("light_path_length", "eye_path_length", "vlp_connections", "light_samples", "weighting")
+    names = ("light_path_length", "eye_path_length", "vlp_connections", "light_samples", "splats", "weighting")
     # Enums as plain text: Blender does not take a StrEnum.
     return {name: getattr(values, name) for name in names} | {"weighting": values.weighting.value, "light_paths": 0}
 
@@ -71,6 +71,7 @@ _DEFAULTS = {
     "eye_path_length": 8,
     "vlp_connections": 1,
     "light_samples": 1,
+    "splats": True,
     "weighting": "BALANCE",
 } | preset("BALANCED")
 
@@ -146,6 +147,18 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
         min=0,
         max=1024,
         soft_max=16,
+    )
+    splats: bpy.props.BoolProperty(
+        name="Splats",
+        description="Light that leaves the lamps may land on the picture from wherever it hits: sharp caustics, as "
+        "under a glass, with far less noise. Costs little, and changes nothing else",
+        default=_DEFAULTS["splats"],
+    )
+    hits: bpy.props.BoolProperty(
+        name="Lamp Hits",
+        description="Count the light that is found by running into a lamp or the sky. Off, shining surfaces and the "
+        "sky look black, and so do their images in mirrors: a switch for finding out where noise comes from",
+        default=True,
     )
     weighting: bpy.props.EnumProperty(
         name="Weighting",

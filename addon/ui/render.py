@@ -54,7 +54,18 @@ class VLP_BPT_PT_light_paths(_RenderPanel, bpy.types.Panel):
         hits.prop(settings, "vlp_connections")
         hits.prop(settings, "light_samples")
         column.separator()
+        column.prop(settings, "splats")
+
+
+class VLP_BPT_PT_strategies(_RenderPanel, bpy.types.Panel):
+    bl_label = "Strategies"
+    bl_parent_id = "VLP_BPT_PT_light_paths"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Any) -> None:
+        column, settings = self.column(context)
         column.prop(settings, "weighting")
+        column.prop(settings, "hits")
 
 
 class VLP_BPT_PT_film(_RenderPanel, bpy.types.Panel):
@@ -127,6 +138,7 @@ class VLP_BPT_PT_statistics(_RenderPanel, bpy.types.Panel):
 CLASSES = (
     VLP_BPT_PT_sampling,
     VLP_BPT_PT_light_paths,
+    VLP_BPT_PT_strategies,
     VLP_BPT_PT_film,
     VLP_BPT_PT_performance,
     VLP_BPT_PT_simplify,

@@ -1,5 +1,6 @@
 // The CPU back end: both passes as parallel loops over paths and over tiles of pixels.
 #include <algorithm>
+#include <atomic>
 #include <numeric>
 
 #include "backend/backend.h"
@@ -13,6 +14,7 @@ namespace {
 
 constexpr uint32_t k_paths_per_piece = 1024;
 constexpr uint32_t k_tile = 16;  // pixels a side
+constexpr uint32_t k_rows = 16;  // of the film that are cleared or committed at a time
 
 // Memory for light vertices on cache-line boundaries, left uninitialised: the light pass writes every slot.
 struct AlignedDeleter {
@@ -52,14 +54,22 @@ std::vector<Tile> tiles_in_morton_order(Window window) {
     return tiles;
 }
 
+struct AtomicAdd {
+    uint64_t operator()(uint64_t& word, uint64_t x) const {
+        return std::atomic_ref(word).fetch_add(x, std::memory_order_relaxed);
+    }
+};
+
 class CpuBackend final : public Backend {
 public:
     CpuBackend(const SceneView& scene, const PassSettings& pass, unsigned threads)
         : scene_(scene), pass_(pass), pool_(threads) {
-        if (uses_virtual_light_points()) {
+        if (pass.kappa > 0) {
             const size_t capacity = static_cast<size_t>(pass.light_paths) * pass.light_path_length;
             slots_ = allocate_light_vertices(capacity);
             stored_.resize(capacity);
+        }
+        if (pass.traces_light()) {
             stored_in_piece_.resize((pass.light_paths + k_paths_per_piece - 1) / k_paths_per_piece + 1);
         }
     }
@@ -69,12 +79,13 @@ public:
         const uint32_t pieces = stored_in_piece_.empty() ? 0 : static_cast<uint32_t>(stored_in_piece_.size()) - 1;
         counters.work_done = 0;
         counters.work_total = pieces + static_cast<uint32_t>(tiles_.size());
+        for_rows(film, [&](uint32_t begin, uint32_t end) { film.clear_splats(begin, end); });
 
         LightVertexCache cache;
         if (pieces > 0) {
-            run_light_pass(iteration, stop);
+            run_light_pass(iteration, film, stop);
             if (stop) return false;
-            cache = {slots_.get(), stored_.data(), stored_in_piece_.back()};
+            if (slots_) cache = list_stored();
         }
         counters.stored_vlps = cache.stored_count;
 
@@ -84,9 +95,7 @@ public:
             counters.work_done.fetch_add(1, std::memory_order_relaxed);
         });
         if (stop) return false;
-        const uint32_t height = film.window().height, rows = 16;
-        pool_.run((height + rows - 1) / rows,
-                  [&](uint32_t i) { film.commit_rows(i * rows, std::min((i + 1) * rows, height)); });
+        for_rows(film, [&](uint32_t begin, uint32_t end) { film.commit_rows(begin, end); });
         film.count_iteration();
         return true;
     }
@@ -96,25 +105,35 @@ public:
     }
 
 private:
-    bool uses_virtual_light_points() const {
-        return pass_.kappa > 0 && pass_.vlp_connections > 0 && pass_.light_path_length > 0 && pass_.light_paths > 0;
+    template <typename Body>
+    void for_rows(const Film& film, const Body& body) {
+        const uint32_t height = film.window().height;
+        pool_.run((height + k_rows - 1) / k_rows,
+                  [&](uint32_t i) { body(i * k_rows, std::min((i + 1) * k_rows, height)); });
     }
 
-    // Traces all light paths, then lists the slots that can be connected in the order of the slots.
-    void run_light_pass(uint32_t iteration, const std::atomic<bool>& stop) {
-        const uint32_t pieces = static_cast<uint32_t>(stored_in_piece_.size()) - 1;
-        pool_.run(pieces, [&](uint32_t piece) {
+    // Traces all light paths, whose vertices are kept only where they serve as VLPs.
+    void run_light_pass(uint32_t iteration, Film& film, const std::atomic<bool>& stop) {
+        pool_.run(static_cast<uint32_t>(stored_in_piece_.size()) - 1, [&](uint32_t piece) {
             if (stop) return;
+            LightVertex path_alone[k_max_walk];
+            SplatSink<AtomicAdd> sink{pass_, film.window(), film.splats().data(), {}};
             uint32_t stored = 0;
             const uint32_t end = std::min((piece + 1) * k_paths_per_piece, pass_.light_paths);
             for (uint32_t path = piece * k_paths_per_piece; path < end; ++path) {
-                LightVertex* slots = slots_.get() + static_cast<size_t>(path) * pass_.light_path_length;
-                stored += trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots);
+                LightVertex* slots =
+                    slots_ ? slots_.get() + static_cast<size_t>(path) * pass_.light_path_length : path_alone;
+                stored += trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots, sink);
             }
             stored_in_piece_[piece] = stored;
+            count_dropped(sink.dropped);
             counters.work_done.fetch_add(1, std::memory_order_relaxed);
         });
-        if (stop) return;
+    }
+
+    // Lists the slots that can be connected, in their order.
+    LightVertexCache list_stored() {
+        const uint32_t pieces = static_cast<uint32_t>(stored_in_piece_.size()) - 1;
         stored_in_piece_.back() = 0;
         std::exclusive_scan(stored_in_piece_.begin(), stored_in_piece_.end(), stored_in_piece_.begin(), 0u);
         pool_.run(pieces, [&](uint32_t piece) {
@@ -125,6 +144,7 @@ private:
                 if (slots_[slot].connectible()) stored_[next++] = slot;
             }
         });
+        return {slots_.get(), stored_.data(), stored_in_piece_.back()};
     }
 
     void run_tile(uint32_t iteration, Film& film, const LightVertexCache& cache, Tile tile) {
@@ -141,6 +161,10 @@ private:
                 film.frame()[static_cast<size_t>(y) * window.width + x] = {{c.r, c.g, c.b, alpha}};
             }
         }
+        count_dropped(dropped);
+    }
+
+    void count_dropped(uint64_t dropped) {
         if (dropped > 0) counters.dropped.fetch_add(dropped, std::memory_order_relaxed);
     }
 

@@ -16,12 +16,20 @@ constexpr uint32_t k_pixels_per_launch = 1u << 20;  // bounds how long a kernel 
 
 uint32_t blocks_for(uint32_t threads) { return (threads + k_block_size - 1) / k_block_size; }
 
-__global__ void light_pass(SceneView scene, PassSettings pass, uint32_t iteration, LightVertex* slots,
-                           uint32_t* stored_in_path) {
+struct AtomicAdd {
+    __device__ uint64_t operator()(uint64_t& word, uint64_t x) const {
+        return atomicAdd(reinterpret_cast<unsigned long long*>(&word), static_cast<unsigned long long>(x));
+    }
+};
+
+__global__ void light_pass(SceneView scene, PassSettings pass, uint32_t iteration, Window window, LightVertex* slots,
+                           uint32_t* stored_in_path, ExactSum* splats, unsigned long long* dropped) {
     const uint32_t path = blockIdx.x * blockDim.x + threadIdx.x;
     if (path >= pass.light_paths) return;
     LightVertex* own = slots + static_cast<size_t>(path) * pass.light_path_length;
-    stored_in_path[path] = trace_light_path(scene, pass, k_light_stream, iteration, path, own);
+    SplatSink<AtomicAdd> sink{pass, window, splats, {}};
+    stored_in_path[path] = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
+    if (sink.dropped > 0) atomicAdd(dropped, static_cast<unsigned long long>(sink.dropped));
 }
 
 // Lists the slots that can be connected, in their order: `end_of_path` is the inclusive scan of stored_in_path.
@@ -59,8 +67,9 @@ public:
         });
         dropped_ = DeviceBuffer<unsigned long long>(1, "a counter");
         frame_ = DeviceBuffer<PixelSample>(scene.window().pixel_count(), "the film");
-        bytes_ += frame_.bytes();
-        if (pass_.kappa > 0 && pass_.light_paths > 0) {
+        if (pass_.splats) splats_ = DeviceBuffer<ExactSum>(scene.window().pixel_count() * 3, "splats");
+        bytes_ += frame_.bytes() + splats_.bytes();
+        if (pass_.traces_light()) {
             const size_t capacity = static_cast<size_t>(pass_.light_paths) * pass_.light_path_length;
             slots_ = DeviceBuffer<LightVertex>(capacity, "light vertices");
             stored_ = DeviceBuffer<uint32_t>(capacity, "the list of virtual light points");
@@ -79,7 +88,7 @@ public:
         counters.work_done = 0;
         counters.work_total = pixels;
         check_cuda(cudaMemset(dropped_.data(), 0, dropped_.bytes()), "clearing a counter");
-        const LightVertexCache cache = run_light_pass(iteration);
+        const LightVertexCache cache = run_light_pass(iteration, window);
         for (uint32_t first = 0; first < pixels; first += k_pixels_per_launch) {
             if (stop) return false;
             const uint32_t end = std::min(pixels, first + k_pixels_per_launch);
@@ -94,6 +103,8 @@ public:
         check_cuda(cudaMemcpy(&dropped, dropped_.data(), sizeof dropped, cudaMemcpyDeviceToHost), "reading a counter");
         check_cuda(cudaMemcpy(film.frame().data(), frame_.data(), frame_.bytes(), cudaMemcpyDeviceToHost),
                    "reading the film");
+        check_cuda(cudaMemcpy(film.splats().data(), splats_.data(), splats_.bytes(), cudaMemcpyDeviceToHost),
+                   "reading the splats");
         counters.dropped.fetch_add(dropped, std::memory_order_relaxed);
         film.commit_rows(0, window.height);
         film.count_iteration();
@@ -103,11 +114,14 @@ public:
     size_t bytes() const override { return bytes_; }
 
 private:
-    LightVertexCache run_light_pass(uint32_t iteration) {
+    LightVertexCache run_light_pass(uint32_t iteration, Window window) {
         if (slots_.size() == 0) return {};
         const uint32_t paths = pass_.light_paths;
-        light_pass<<<blocks_for(paths), k_block_size>>>(scene_, pass_, iteration, slots_.data(), end_of_path_.data());
+        check_cuda(cudaMemset(splats_.data(), 0, splats_.bytes()), "clearing the splats");
+        light_pass<<<blocks_for(paths), k_block_size>>>(scene_, pass_, iteration, window, slots_.data(),
+                                                        end_of_path_.data(), splats_.data(), dropped_.data());
         check_cuda(cudaGetLastError(), "starting the light pass");
+        if (!(pass_.kappa > 0)) return {};
         size_t scratch = scratch_.bytes();
         check_cuda(cub::DeviceScan::InclusiveSum(scratch_.data(), scratch, end_of_path_.data(), end_of_path_.data(),
                                                  static_cast<int>(paths)),
@@ -127,6 +141,7 @@ private:
     DeviceBuffer<uint32_t> stored_, end_of_path_;
     DeviceBuffer<std::byte> scratch_;
     DeviceBuffer<PixelSample> frame_;
+    DeviceBuffer<ExactSum> splats_;
     DeviceBuffer<unsigned long long> dropped_;
     size_t bytes_ = 0;
 };

@@ -42,6 +42,8 @@ PassSettings pass_of(const nb::dict& settings, bool transparent_film) {
     pass.light_paths = get<uint32_t>(settings, "light_paths");
     pass.vlp_connections = get<uint32_t>(settings, "vlp_connections");
     pass.light_samples = get<uint32_t>(settings, "light_samples");
+    pass.splats = get<bool>(settings, "splats");
+    pass.hits = get<bool>(settings, "hits");
     pass.weighting = weighting_of(get<std::string>(settings, "weighting"));
     pass.roulette = get<std::string>(settings, "mode") == "REFERENCE";
     pass.transparent_film = transparent_film;
@@ -83,6 +85,11 @@ void require_size_of_film(const Renderer& renderer, const A& array, const char* 
 void add_film_state(Renderer& renderer, FilmState state, uint64_t iterations) {
     require_size_of_film(renderer, state, "film state");
     renderer.film().add({reinterpret_cast<const ExactSum*>(state.data()), state.size() / 2}, iterations);
+}
+
+// In one iteration.
+uint32_t traced_light_paths(const Renderer& renderer) {
+    return renderer.pass().traces_light() ? renderer.pass().light_paths : 0;
 }
 
 nb::dict memory_of(const Renderer& renderer, const Scene& scene) {
@@ -144,9 +151,10 @@ void bind_renderer(nb::module_& m) {
         .def_prop_ro("iterations", [](const Renderer& r) { return r.film().iterations(); })
         .def_prop_ro("vlps", [](const Renderer& r) { return r.counters().stored_vlps.load(); })
         .def_prop_ro("dropped", [](const Renderer& r) { return r.counters().dropped.load(); })
+        .def_prop_ro("light_paths", &traced_light_paths)
         .def_prop_ro("paths",
                      [](const Renderer& r) {
-                         return r.film().iterations() * (r.film().window().pixel_count() + r.pass().light_paths);
+                         return r.film().iterations() * (r.film().window().pixel_count() + traced_light_paths(r));
                      })
         .def_prop_ro("kappa", [](const Renderer& r) { return r.pass().kappa; });
     m.def("devices", &devices);

@@ -59,26 +59,29 @@ struct FilmProjection {
     Vec2 film;  // pixels
     Vec3 lens;  // the lens point in the scene
     Vec3 direction;  // from it to the point
-    float distance = 0;
+    float distance = 0;  // negative behind the lens of an orthographic camera
     float pixels_per_area = 0;
 };
 
 VLP_HD inline FilmProjection project(const Camera& camera, Vec2 lens, Vec3 point) {
     const Vec3 p = camera_to_local(camera, point - camera.camera_to_world.column(3));
     FilmProjection r;
-    const bool in_view = -p.z > 0 && -p.z >= camera.clip_start && -p.z <= camera.clip_end;
+    const bool perspective = camera.projection == Projection::perspective;
+    const bool in_view = -p.z >= camera.clip_start && -p.z <= camera.clip_end && (!perspective || -p.z > 0);
     if (!in_view) return r;
-    Vec3 from{lens.x, lens.y, 0};
-    if (camera.projection == Projection::perspective) {
+    Vec3 from{lens.x, lens.y, 0}, direction;
+    if (perspective) {
         r.film = perspective_film(camera, lens, p);
-    } else {
+        r.distance = length(p - from);
+        direction = (p - from) / r.distance;
+    } else {  // rays may begin behind the lens
         r.film = orthographic_film(camera, lens, p);
-        const Vec2 on_plane = film_to_plane(camera, r.film) + lens;
-        from = {on_plane.x, on_plane.y, 0};
+        direction = orthographic_direction(camera, lens);
+        r.distance = p.z / direction.z;
+        from = p - direction * r.distance;
     }
-    r.distance = length(p - from);
     r.lens = transform_point(camera.camera_to_world, from);
-    r.direction = transform_vector(camera.camera_to_world, (p - from) / r.distance);
+    r.direction = transform_vector(camera.camera_to_world, direction);
     r.pixels_per_area = pixels_per_area(camera, r.direction, r.distance);
     r.valid = is_finite(r.pixels_per_area) && is_finite(r.film.x) && is_finite(r.film.y);
     return r;

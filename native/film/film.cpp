@@ -1,14 +1,24 @@
 // The film's sums and means.
 #include "film/film.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace vlp {
+
+void Film::clear_splats(uint32_t row_begin, uint32_t row_end) {
+    if (splats_.empty()) return;
+    const auto row = [&](uint32_t y) {
+        return splats_.begin() + static_cast<ptrdiff_t>(size_t{3} * y * window_.width);
+    };
+    std::fill(row(row_begin), row(row_end), ExactSum{});
+}
 
 void Film::commit_rows(uint32_t begin, uint32_t end) {
     const size_t first = static_cast<size_t>(begin) * window_.width, last = static_cast<size_t>(end) * window_.width;
     for (size_t i = first; i < last; ++i) {
         for (size_t c = 0; c < 4; ++c) sums_[4 * i + c].add(frame_[i].rgba[c]);
+        for (size_t c = 0; c < 3 && !splats_.empty(); ++c) sums_[4 * i + c].add(splats_[3 * i + c]);
     }
 }
 

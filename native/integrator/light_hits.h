@@ -25,8 +25,8 @@ VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings&
     const float eye_pdf =
         is_infinite(light) ? pdf_solid_angle : pdf_solid_angle * abs_dot(normal, direction) / dist_squared;
     const LightEnd end = light_end(scene, light_index, x_1, position, normal, direction, dist_squared);
-    StrategySum sum = strategy_sum(pass, 0);
-    if (!eye.last().specular) sum.add(end.pdf_next_event / eye_pdf, strategy_count(pass, 1));
+    StrategySum sum = strategy_sum(pass, 0, t);
+    if (!eye.last().specular) sum.add(end.pdf_next_event / eye_pdf, strategy_count(pass, 1, t - 1));
     const float cos_x_1 = abs_dot(x_1.geometric_normal, direction);
     const float ratio = end.pdf_emission / eye_pdf * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
     add_longer_light_walks(sum, pass, eye.vertices, t, 2, ratio, eye.last().rev_ratio);
@@ -48,13 +48,14 @@ struct LightHits {
     VLP_HD bool sees(const Light& light) const { return eye.t > 1 || (light.visibility & k_visible_to_camera) != 0; }
 
     VLP_HD void on_stretch(const Ray& ray, Rgb through) const {
+        if (!pass.hits) return;
         for_each_lamp_hit(scene, ray, [&](uint32_t light, float, Vec3 position, Vec3 normal) {
             if (sees(scene.lights[light])) add(light, position, normal, through);
         });
     }
     VLP_HD void on_surface(const SurfacePoint& z, Rgb through) const {
         const Rgb emission = scene.materials[z.material].emission;
-        if (is_black(emission)) return;
+        if (is_black(emission) || !pass.hits) return;
         const uint32_t light = light_of_surface(scene, z.instance, z.primitive);
         if (light != k_none) {
             add(light, z.position, face_toward(z.geometric_normal, -direction), through);
@@ -63,6 +64,7 @@ struct LightHits {
         }
     }
     VLP_HD void on_escape(Rgb through) const {
+        if (!pass.hits) return;
         for_each_infinite_light(scene, direction, [&](uint32_t light) {
             if (sees(scene.lights[light])) add(light, {}, -direction, through);
         });

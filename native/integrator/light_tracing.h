@@ -3,21 +3,23 @@
 
 #include "bsdf/bsdf.h"
 #include "integrator/light_density.h"
-#include "integrator/trace.h"
-#include "integrator/weights.h"
+#include "integrator/splat.h"
 
 namespace vlp {
 
 // Traces light path `path` of an iteration into slots[0 ... L - 1], y_1 first; slots past its end are marked not valid.
-// Returns how many of them can be connected. `stream` keeps the pilot's paths apart from the render's.
+// Returns how many of them can be connected; each of these is joined to the lens too, for sink.add(Splat), as far as
+// sink.wanted() and sink.reaches(film). `stream` keeps the pilot's paths apart from the render's.
+template <typename Sink>
 VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettings& pass, Stream stream,
-                                        uint32_t iteration, uint32_t path, LightVertex* slots) {
+                                        uint32_t iteration, uint32_t path, LightVertex* slots, Sink& sink) {
     for (uint32_t i = 0; i < pass.light_path_length; ++i) slots[i].packed = 0;
     if (scene.light_count == 0) return 0;
 
     // The paths of an iteration are one stratified set.
     const uint32_t seed = hash(pass.seed, stream, iteration);
     Sampler sampler = make_sampler(seed, path);
+    Sampler lens_sampler = make_sampler(hash(seed, k_lens_stream), path);
     const DiscreteSample choice = choose_light(scene, sampler.next_bits());
     const Light& light = scene.lights[choice.index];
     const Vec2 u_position = sampler.next_2d(), u_direction = sampler.next_2d();
@@ -78,6 +80,10 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
         if (material.has_finite) {  // Listing 2: save a VLP
             vertex.packed |= LightVertex::k_connectible;
             ++connectible;
+            if (sink.wanted()) {
+                lens_sampler.dimension = i;
+                connect_to_lens(scene, pass, vertex, y, -ray.direction, lens_sampler.next_2d(), sink);
+            }
         }
         if (i == pass.light_path_length) break;
 

@@ -35,11 +35,11 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
 
     const uint32_t n = eye.t + 1;
     const float dist_squared = event.distance * event.distance;
-    StrategySum sum = strategy_sum(pass, 1);
+    StrategySum sum = strategy_sum(pass, 1, eye.t);
     if (!event.delta && n <= pass.eye_path_length + 1) {
-        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0));
+        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0, n));
     }
-    if (pass.light_path_length > 0 && eye.t > 2) {
+    if (pass.light_path_length > 0 && (eye.t > 2 || pass.splats)) {
         const LightEnd end =
             light_end(scene, choice.index, x_1, event.position, event.normal, event.direction, dist_squared);
         const float ratio = end.pdf_emission / end.pdf_next_event * (end.pdf_next * cos_x_1 / eye.last().pdf_area);

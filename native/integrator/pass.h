@@ -20,6 +20,8 @@ struct PassSettings {
     uint32_t light_paths = 0;        // N
     uint32_t vlp_connections = 1;    // C
     uint32_t light_samples = 1;      // S
+    bool splats = false;             // joins light paths to the lens; wants L and N above 0
+    bool hits = true;                // counts lights that the eye walk itself meets
     Weighting weighting = Weighting::balance;
     bool roulette = false;           // ends walks at random by their throughput instead of at a fixed length
     bool transparent_film = false;   // the camera sees no background
@@ -27,6 +29,9 @@ struct PassSettings {
     float kappa = 0;  // C N / V, V being what a pilot pass of the scene stored: how often a VLP is drawn
     Filter filter = Filter::blackman_harris;
     float filter_width = 1.5f;  // full width (pixels)
+
+    // Whether an iteration has a light pass.
+    bool traces_light() const { return kappa > 0 || splats; }
 };
 
 // The virtual light points of one iteration. Path p keeps its hits y1 ... yL in slots [p L, p L + L); `stored` lists the
@@ -38,6 +43,12 @@ struct LightVertexCache {
 };
 
 // The streams that a seed and an iteration hold apart; the dimension that each walk step starts from.
-enum Stream : uint32_t { k_light_stream = 1, k_eye_stream = 2, k_pilot_stream = 3, k_transparency_stream = 4 };
+enum Stream : uint32_t {
+    k_light_stream = 1,
+    k_eye_stream = 2,
+    k_pilot_stream = 3,
+    k_transparency_stream = 4,
+    k_lens_stream = 5,
+};
 
 }  // namespace vlp

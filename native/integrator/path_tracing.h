@@ -20,6 +20,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
 
     EyeWalk eye;
     float pdf_solid_angle = 1;  // of the direction that the walk took last
+    const Vec3 lens = ray.origin - ray.direction * distance_from_lens(scene.camera, ray);
     PrimitiveId skip{};
     Anchor from{};
     const bool has_vlps = pass.kappa > 0 && cache.stored_count > 0 && pass.vlp_connections > 0;
@@ -41,9 +42,11 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         // z becomes the walk's last vertex.
         const SurfacePoint& z = step.surface;
         const VertexDensity& previous = eye.last();
-        const float dist_squared = length_squared(z.position - (from_camera ? ray.origin : from.position));
+        const float dist_squared = length_squared(z.position - (from_camera ? lens : from.position));
+        const float per_area = from_camera ? pixels_per_area(scene.camera, ray.direction, std::sqrt(dist_squared))
+                                           : pdf_solid_angle / dist_squared;
         VertexDensity& vertex = eye.vertices[eye.t];
-        vertex.pdf_area = pdf_solid_angle * abs_dot(z.geometric_normal, ray.direction) / dist_squared;
+        vertex.pdf_area = per_area * abs_dot(z.geometric_normal, ray.direction);
         vertex.rev_geometry =
             from_camera ? 0.0f : abs_dot(from.normal, ray.direction) / (dist_squared * previous.pdf_area);
         vertex.rev_ratio = 0;

@@ -10,7 +10,7 @@ namespace vlp {
 // Densities of one vertex of a walk, light or eye, for the weights. "Forward" is the walk's own direction, "reverse" is
 // the way in which the other walk would have come. Both are per area of surface.
 struct VertexDensity {
-    float pdf_area = 0;      // forward density of this vertex
+    float pdf_area = 0;      // forward density of this vertex; of z_1 over one pixel
     // Times the solid-angle density of scattering back from this vertex: reverse over forward density of the previous
     // vertex. That is |cos| / dist^2 / pdf_area of the previous vertex; 0 where it cannot be reached by a ray.
     float rev_geometry = 0;

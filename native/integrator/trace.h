@@ -77,9 +77,12 @@ VLP_HD inline Step walk(const SceneView& scene, Ray ray, PrimitiveId skip, bool 
     return step;
 }
 
-// What passes through transparent surfaces on the way along `ray`; black when something blocks it.
-VLP_HD inline Rgb transmittance(const SceneView& scene, Ray ray, PrimitiveId from, PrimitiveId to) {
-    if (!scene.has_transparency) return any_hit(scene, ray, from, to) ? Rgb{} : rgb(1);
+// What passes through transparent surfaces on the way along `ray`; black when something blocks it. A ray `to_camera` is
+// not blocked by what the camera does not see.
+VLP_HD inline Rgb transmittance(const SceneView& scene, Ray ray, PrimitiveId from, PrimitiveId to,
+                                bool to_camera = false) {
+    if (!scene.has_transparency && !(to_camera && scene.hides_from_camera))
+        return any_hit(scene, ray, from, to) ? Rgb{} : rgb(1);
     Rgb through = rgb(1);
     PrimitiveId skip = from;
     for (int i = 0; i < k_max_transparent; ++i) {
@@ -89,8 +92,10 @@ VLP_HD inline Rgb transmittance(const SceneView& scene, Ray ray, PrimitiveId fro
             return through;
         }
         const SurfacePoint surface = surface_at(scene, ray, hit);
-        through *= scene.materials[surface.material].transparency;
-        if (is_black(through)) return through;
+        if (!to_camera || (scene.instances[hit.instance].visibility & k_visible_to_camera)) {
+            through *= scene.materials[surface.material].transparency;
+            if (is_black(through)) return through;
+        }
         ray.origin = leave(anchor_of(surface), ray.direction);
         ray.t_max -= hit.t;
         skip = {hit.instance, hit.primitive};
@@ -111,11 +116,12 @@ VLP_HD inline Edge edge_between(Vec3 from, Vec3 to) {
 }
 
 // Transmittance between two points; their surfaces do not block.
-VLP_HD inline Rgb transmittance(const SceneView& scene, const Anchor& from, const Anchor& to, Vec3 direction) {
+VLP_HD inline Rgb transmittance(const SceneView& scene, const Anchor& from, const Anchor& to, Vec3 direction,
+                                bool to_camera = false) {
     const Vec3 origin = leave(from, direction), target = leave(to, -direction);
     const Vec3 d = target - origin;
     const float distance = length(d);
-    return transmittance(scene, {origin, d * (1.0f / distance), distance}, from.id, to.id);
+    return transmittance(scene, {origin, d * (1.0f / distance), distance}, from.id, to.id, to_camera);
 }
 
 }  // namespace vlp

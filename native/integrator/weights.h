@@ -1,13 +1,16 @@
 // Multiple importance weights within the window of path lengths that the passes can make.
 //
 // A path x_0 ... x_{n-1} runs from a light to the lens. Strategy k makes x_0 ... x_{k-1} by the light walk and the rest by
-// the eye walk; k = 0 hits the light, k = 1 is next event, k >= 2 joins an eye vertex to a virtual light point. It draws a
-// path with density
+// the eye walk; k = 0 hits the light, k = 1 is next event, k >= 2 joins an eye vertex to a virtual light point, or the lens
+// to a light vertex where k = n - 1. It draws a path with density
 //     p_k = count_k * prod_{i < k} light_i * prod_{i >= k} eye_i,
 // light_i and eye_i being the densities of x_i per area in the two walks. Neighbouring strategies differ in one vertex, so
 // p_{k+1} / p_k = count_{k+1} / count_k * light_k / eye_k, and the weights need only products of such ratios (Veach 1997,
 // 10.2). Strategies with k > L + 1 or n - k > K + 1 do not exist (the paper fixes lengths) and are left out, as are those
 // whose connection touches a delta distribution. Next event chooses x_0 by a density of its own: p_1 takes it for light_0.
+// The lens point x_{n-1} has the same density in every strategy. Eye walks of one pixel, and splats on it, share its filter
+// h, which is left out: eye_{n-2} is as if film positions had density 1 per pixel^2, and so the weights of a path sum to
+// one whatever the pixel.
 #pragma once
 
 #include "integrator/pass.h"
@@ -15,9 +18,12 @@
 
 namespace vlp {
 
-// How often an iteration draws strategy k: hits once, S light samples, and kappa connections a virtual light point.
-VLP_HD inline float strategy_count(const PassSettings& pass, uint32_t k) {
-    return k == 0 ? 1.0f : k == 1 ? static_cast<float>(pass.light_samples) : pass.kappa;
+// How often an iteration draws strategy (s, t) for a pixel: hits once, S light samples, kappa connections to a virtual light
+// point, and N light paths of which each may splat on it. 0: it is switched off.
+VLP_HD inline float strategy_count(const PassSettings& pass, uint32_t s, uint32_t t) {
+    if (t == 1) return pass.splats ? static_cast<float>(pass.light_paths) : 0.0f;
+    if (s == 0) return pass.hits ? 1.0f : 0.0f;
+    return s == 1 ? static_cast<float>(pass.light_samples) : pass.kappa;
 }
 
 // Sums what the other strategies have relative to the one at hand.
@@ -44,8 +50,8 @@ struct StrategySum {
     VLP_HD float weight() const { return 1.0f / sum; }
 };
 
-VLP_HD inline StrategySum strategy_sum(const PassSettings& pass, uint32_t k) {
-    return {pass.weighting, strategy_count(pass, k)};
+VLP_HD inline StrategySum strategy_sum(const PassSettings& pass, uint32_t s, uint32_t t) {
+    return {pass.weighting, strategy_count(pass, s, t)};
 }
 
 // Adds strategies k_first, k_first + 1, ...: eye vertices become light vertices, from the light's end of the eye walk on.
@@ -53,29 +59,29 @@ VLP_HD inline StrategySum strategy_sum(const PassSettings& pass, uint32_t k) {
 // `next_ratio` is light / eye density of x_{k_first}, which the connection at hand decides; further ones are in `eye`.
 VLP_HD inline void add_longer_light_walks(StrategySum& sum, const PassSettings& pass, const VertexDensity* eye,
                                           uint32_t n, uint32_t k_first, float ratio, float next_ratio) {
-    // The lens is never joined to a light vertex, so an eye walk keeps z_0 and z_1.
-    for (uint32_t k = k_first; k <= pass.light_path_length + 1 && k + 2 <= n && ratio > 0; ++k) {
+    const uint32_t t_least = pass.splats ? 1 : 2;
+    for (uint32_t k = k_first; k <= pass.light_path_length + 1 && k + t_least <= n && ratio > 0; ++k) {
         const VertexDensity &end = eye[n - 1 - k], &freed = eye[n - k];  // x_k and x_{k-1}
-        if (!end.specular && !freed.specular) sum.add(ratio, strategy_count(pass, k));
+        if (!end.specular && !freed.specular) sum.add(ratio, strategy_count(pass, k, n - k));
         ratio *= k == k_first ? next_ratio : freed.rev_ratio;
     }
 }
 
-// Adds strategies s - 1, s - 2, ..., 0: light vertices become eye vertices, from the virtual light point `vlp` = y_{s-1} back
-// to the light. `ratio` is eye / light density of the VLP and `next_ratio` of the vertex before it, as connected.
+// Adds strategies s - 1, s - 2, ..., 0: light vertices become eye vertices, from the light vertex `vlp` = y_{s-1} back to
+// the light. `ratio` is eye / light density of the VLP and `next_ratio` of the vertex before it, as connected.
 VLP_HD inline void add_shorter_light_walks(StrategySum& sum, const PassSettings& pass, const LightVertex* vlp,
                                            uint32_t s, uint32_t n, float ratio, float next_ratio) {
     const LightVertex* freed = vlp;  // x_k = y_k, free of the light walk from strategy k on
     for (uint32_t k = s - 1; n - k <= pass.eye_path_length + 1 && ratio > 0; --k, --freed) {
         if (k == 0) {  // y_0 has no slot: `freed` must not be looked at
-            sum.add(ratio, strategy_count(pass, 0));
+            sum.add(ratio, strategy_count(pass, 0, n));
             return;
         }
         const bool finite = freed == vlp || !freed->specular();
         if (k == 1) {
-            if (finite) sum.add(ratio * freed->next_event_ratio, strategy_count(pass, 1));
+            if (finite) sum.add(ratio * freed->next_event_ratio, strategy_count(pass, 1, n - 1));
         } else if (finite && !freed[-1].specular()) {
-            sum.add(ratio, strategy_count(pass, k));
+            sum.add(ratio, strategy_count(pass, k, n - k));
         }
         ratio *= freed == vlp ? next_ratio : freed->rev_ratio;
     }

@@ -91,6 +91,29 @@ inline Scattering scatter(const SceneView& scene, const PathVertex& v) {
     return {mass, mass * d_light_over_d_eye};
 }
 
+// How many square pixels of the film a square metre of the surface at z_1 covers, seen from the path's lens point: the
+// Jacobian of (right, up) / depth, or of the parallel projection, along two tangents of the surface.
+inline double film_density(const Camera& camera, const PathVertex& z_1) {
+    const auto local = [&](Vec3d v) {
+        const Affine& m = camera.camera_to_world;
+        return Vec3d{dot(v, wide(m.column(0))), dot(v, wide(m.column(1))), -dot(v, wide(m.column(2)))};
+    };
+    const Vec3d p = local(between(camera.camera_to_world.column(3), z_1.surface.position));
+    const Vec3d ray = local(wide(z_1.to_eye));
+    const double right = ray.x / ray.z, up = ray.y / ray.z;  // of the ray, per metre of depth
+    const double depth = camera.projection == Projection::perspective ? p.z : 1;
+    const Vec3d n = wide(z_1.surface.geometric_normal);
+    const Vec3d aside = std::fabs(n.x) < 0.5 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0};
+    const double n_aside = dot(n, aside);
+    const Vec3d a{aside.x - n_aside * n.x, aside.y - n_aside * n.y, aside.z - n_aside * n.z};
+    const Vec3d b{n.y * a.z - n.z * a.y, n.z * a.x - n.x * a.z, n.x * a.y - n.y * a.x};
+    const Vec3d ta = local(a), tb = local(b);
+    const double determinant = (ta.x - right * ta.z) * (tb.y - up * tb.z) - (tb.x - right * tb.z) * (ta.y - up * ta.z);
+    const double per_plane =
+        camera.width / (2.0 * double{camera.half_size.x}) * camera.height / (2.0 * double{camera.half_size.y});
+    return std::fabs(determinant) / (dot(a, a) * depth * depth) * per_plane;
+}
+
 // Densities of every strategy k = 0 ... n - 1, times its count; 0 for those that cannot make the path.
 inline std::vector<double> strategy_densities(const SceneView& scene, const PassSettings& pass, const Path& path) {
     const uint32_t n = path.size();
@@ -103,7 +126,7 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
     std::vector<Scattering> scattering(n);
     for (uint32_t i = 1; i + 1 < n; ++i) scattering[i] = scatter(scene, path.x[i]);
 
-    // Of each vertex in the light walk and in the eye walk; the lens and x_{n-2} are made by the eye walk in any case.
+    // Of each vertex in the light walk and in the eye walk; the lens is chosen alike in every strategy.
     std::vector<double> by_light(n, 1), by_eye(n, 1);
     const double choice = pdf_choose_light(scene, path.light);
     const EmissionPdf emission = pdf_emission(scene, light, position_0, normal_0, x_0.to_eye);
@@ -114,7 +137,7 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
         by_light[0] = choice * emission.position;
         by_light[1] = per_area(emission.direction, position_0, position_1, normal_1);
     }
-    for (uint32_t i = 2; i < n; ++i) {
+    for (uint32_t i = 2; i + 1 < n; ++i) {
         const SurfacePoint &from = path.x[i - 1].surface, &to = path.x[i].surface;
         by_light[i] = per_area(scattering[i - 1].to_eye, from.position, to.position, to.geometric_normal);
     }
@@ -123,6 +146,7 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
         by_eye[i] = scattering[i + 1].to_light;
         if (i > 0 || !infinite) by_eye[i] = per_area(by_eye[i], from.position, to.position, to.geometric_normal);
     }
+    by_eye[n - 2] = n > 2 ? film_density(scene.camera, path.x[n - 2]) : 1;
     double next_event = choice;
     if (is_on_light(light, x_1.surface)) {
         next_event = 0;
@@ -132,12 +156,15 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
     }
 
     std::vector<double> densities(n, 0);
-    for (uint32_t k = 0; k + 2 <= n; ++k) {
+    for (uint32_t k = 0; k < n; ++k) {
         if (k > pass.light_path_length + 1 || n - k > pass.eye_path_length + 1) continue;  // the window
         if (k == 0 && is_delta(light)) continue;  // no ray hits it
-        if (k == 1 && (n == 2 || x_1.specular)) continue;
+        if (n == 2 && k > 0) continue;  // hits alone show lights directly
+        if ((k == 0 && !pass.hits) || (k == n - 1 && !pass.splats)) continue;
+        if (k == 1 && x_1.specular) continue;
         if (k >= 2 && (path.x[k - 1].specular || path.x[k].specular)) continue;
         double density = k == 0 ? 1.0 : k == 1 ? double(pass.light_samples) : double{pass.kappa};
+        if (k > 0 && k == n - 1) density = double(pass.light_paths);
         for (uint32_t i = 0; i < n; ++i) density *= i >= k ? by_eye[i] : k == 1 ? next_event : by_light[i];
         densities[k] = density;
     }

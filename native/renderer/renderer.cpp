@@ -13,16 +13,20 @@ float pilot_vlps_per_path(const SceneView& scene, const PassSettings& pass) {
     std::vector<LightVertex> slots(pass.light_path_length);
     uint32_t stored = 0;
     for (uint32_t path = 0; path < k_pilot_paths; ++path) {
-        stored += trace_light_path(scene, pass, k_pilot_stream, 0, path, slots.data());
+        NoSplats none;
+        stored += trace_light_path(scene, pass, k_pilot_stream, 0, path, slots.data(), none);
     }
     return static_cast<float>(stored) / static_cast<float>(k_pilot_paths);
 }
 
 namespace {
 
-PassSettings with_kappa(const SceneView& scene, PassSettings pass) {
+// The settings with what the scene makes of them: kappa, and splats only where there are light paths.
+PassSettings for_scene(const SceneView& scene, PassSettings pass) {
+    const bool light_walks = pass.light_path_length > 0 && pass.light_paths > 0 && scene.light_count > 0;
+    pass.splats &= light_walks;
     pass.kappa = 0;
-    if (pass.vlp_connections > 0 && pass.light_path_length > 0 && pass.light_paths > 0) {
+    if (pass.vlp_connections > 0 && light_walks) {
         const float vlps_per_path = pilot_vlps_per_path(scene, pass);
         if (vlps_per_path > 0) pass.kappa = static_cast<float>(pass.vlp_connections) / vlps_per_path;
     }
@@ -41,8 +45,8 @@ std::unique_ptr<Backend> make_backend(const std::string& device, const Scene& sc
 Renderer::Renderer(std::shared_ptr<const Scene> scene, PassSettings pass, const std::string& device, unsigned threads,
                    uint32_t first_iteration)
     : scene_(std::move(scene)),
-      pass_(with_kappa(scene_->view(), pass)),
-      film_(scene_->window()),
+      pass_(for_scene(scene_->view(), pass)),
+      film_(scene_->window(), pass_.splats),
       backend_(make_backend(device, *scene_, pass_, threads)),
       next_iteration_(first_iteration) {}
 

@@ -221,6 +221,7 @@ SceneView Scene::view_placed(const Place& place) const {
     v.instance_count = static_cast<uint32_t>(instances_.size());
     v.light_count = static_cast<uint32_t>(lights_.size());
     for (const Material& m : materials_) v.has_transparency |= m.pass_through > 0;
+    for (const InstanceView& i : instances_) v.hides_from_camera |= !(i.visibility & k_visible_to_camera);
     v.camera = camera_;
     v.center = center_;
     v.radius = radius_;

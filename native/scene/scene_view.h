@@ -69,6 +69,7 @@ struct SceneView {
     EnvironmentView environment;
     LampView lamps;               // the shapes of lamps, which rays pass through
     bool has_transparency = false;  // some material lets light pass straight through
+    bool hides_from_camera = false;  // some instance is not seen by the camera
     Camera camera;
     Vec3 center;                  // of the sphere around every surface and lamp
     float radius = 1;

@@ -119,7 +119,7 @@ class Renderer:
             seconds=self._seconds,
             build_seconds=self._build_seconds,
             eye_samples=self._rendered * width * height,
-            light_paths=self._rendered * self.settings.light_paths,
+            light_paths=self._rendered * int(self._native.light_paths),
             vlps=int(self._native.vlps),
             dropped=int(self._native.dropped),
             memory={name: int(size) for name, size in self._native.memory().items()},

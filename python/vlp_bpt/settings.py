@@ -10,6 +10,8 @@ from enum import StrEnum
 from operator import index
 from typing import Any
 
+import numpy as np
+
 from .errors import SettingsError
 
 
@@ -57,14 +59,15 @@ class ModePreset:
     eye_path_length: int
     vlp_connections: int
     light_samples: int
+    splats: bool
     weighting: Weighting
     light_vertices: int
 
 
 MODE_PRESETS: dict[Mode, ModePreset] = {
-    Mode.PAPER: ModePreset(1, 5, 1, 1, Weighting.UNIFORM, light_vertices=1 << 23),
-    Mode.BALANCED: ModePreset(3, 8, 1, 1, Weighting.BALANCE, light_vertices=1 << 23),
-    Mode.REFERENCE: ModePreset(64, 64, 1, 1, Weighting.BALANCE, light_vertices=1 << 21),
+    Mode.PAPER: ModePreset(1, 5, 1, 1, False, Weighting.UNIFORM, light_vertices=1 << 23),
+    Mode.BALANCED: ModePreset(3, 8, 1, 1, True, Weighting.BALANCE, light_vertices=1 << 23),
+    Mode.REFERENCE: ModePreset(64, 64, 1, 1, True, Weighting.BALANCE, light_vertices=1 << 21),
 }
 
 # The least and the most that a number may be, both allowed.
@@ -83,8 +86,18 @@ RANGES: dict[str, tuple[float, float]] = {
 
 _ENUMS: dict[str, type[StrEnum]] = {"mode": Mode, "weighting": Weighting, "filter": Filter, "device": Device}
 _REALS = ("time_limit", "filter_width")
+_SWITCHES = ("splats", "hits")
+_ON_OFF = {"on": True, "true": True, "yes": True, "1": True, "off": False, "false": False, "no": False, "0": False}
 # What a mode decides where it is None.
-FROM_MODE = ("light_path_length", "eye_path_length", "light_paths", "vlp_connections", "light_samples", "weighting")
+FROM_MODE = (
+    "light_path_length",
+    "eye_path_length",
+    "light_paths",
+    "vlp_connections",
+    "light_samples",
+    "splats",
+    "weighting",
+)
 
 
 @dataclass
@@ -94,7 +107,11 @@ class RenderSettings:
     samples: iterations. time_limit: seconds, 0 for none. light_path_length: L, most surface hits of a light path.
     eye_path_length: K, most surface hits of an eye path. light_paths: N, light paths of one iteration (0: chosen from
     the picture's size). vlp_connections: C, virtual light points joined to one eye vertex. light_samples: S, light
-    samples at one eye vertex. threads: 0 for all.
+    samples at one eye vertex. splats: light paths are joined to the lens. hits: eye paths that meet a light count.
+    threads: 0 for all.
+
+    C = 0, S = 0, splats and hits switch strategies off. Those that are left share the light that they can find, and
+    the light that none of them finds is missing: without hits, lamps themselves and what only mirrors show of them.
     """
 
     mode: Mode = Mode.BALANCED
@@ -105,6 +122,8 @@ class RenderSettings:
     light_paths: int | None = None
     vlp_connections: int | None = None
     light_samples: int | None = None
+    splats: bool | None = None
+    hits: bool = True
     weighting: Weighting | None = None
     filter: Filter = Filter.BLACKMAN_HARRIS
     filter_width: float = 1.5
@@ -151,7 +170,8 @@ class RenderSettings:
 
     @classmethod
     def from_strings(cls, values: Mapping[str, str]) -> RenderSettings:
-        """Settings from text, as typed after `--set`: numbers, enum names in any case, `auto` for what the mode gives.
+        """Settings from text, as typed after `--set`: numbers, enum names in any case, `on` and `off`, `auto` for what
+        the mode gives.
 
         Raises SettingsError as `from_dict` does.
         """
@@ -167,6 +187,7 @@ class ResolvedSettings(RenderSettings):
     light_paths: int = 1
     vlp_connections: int = 1
     light_samples: int = 1
+    splats: bool = True
     weighting: Weighting = Weighting.BALANCE
 
 
@@ -185,6 +206,8 @@ def _parsed(name: str, text: str) -> Any:
         return None
     if name in _ENUMS:
         return text.upper()
+    if name in _SWITCHES:
+        return _ON_OFF.get(text.lower(), text)
     try:
         return float(text) if name in _REALS else int(text)
     except ValueError:
@@ -202,6 +225,10 @@ def _checked(name: str, value: Any) -> Any:
         except ValueError:
             choices = ", ".join(_ENUMS[name])
             raise SettingsError(f"{name} = {value!r}: must be one of {choices}") from None
+    if name in _SWITCHES:
+        if not isinstance(value, (bool, np.bool_)):
+            raise SettingsError(f"{name} = {value!r}: must be on or off")
+        return bool(value)
     low, high = RANGES[name]
     try:
         if isinstance(value, bool):

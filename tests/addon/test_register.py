@@ -51,7 +51,7 @@ def test_a_mode_writes_what_it_stands_for(mode: Mode) -> None:
     shown.light_paths = 123
     shown.vlp_connections = 77
     shown.mode = mode.value
-    for name in ("light_path_length", "eye_path_length", "vlp_connections", "light_samples", "weighting"):
+    for name in ("light_path_length", "eye_path_length", "vlp_connections", "light_samples", "splats", "weighting"):
         assert getattr(shown, name) == getattr(preset, name), name
     assert shown.light_paths == 0
     shown.eye_path_length = 9  # and leaves what is changed afterwards
@@ -69,6 +69,8 @@ def test_each_setting_is_exported() -> None:
         "light_paths": 600,
         "vlp_connections": 2,
         "light_samples": 3,
+        "splats": False,
+        "hits": False,
         "weighting": "POWER",
         "filter": "GAUSSIAN",
         "filter_width": 2.5,

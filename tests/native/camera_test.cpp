@@ -43,6 +43,17 @@ std::vector<NamedCamera> cameras() {
     return cameras;
 }
 
+// Orthographic ones whose near clip plane lies behind the lens.
+std::vector<NamedCamera> cameras_that_look_back() {
+    std::vector<NamedCamera> found;
+    for (NamedCamera c : cameras()) {
+        if (c.camera.projection == Projection::perspective) continue;
+        c.camera.clip_start = -4;
+        found.push_back(c);
+    }
+    return found;
+}
+
 float depth_of(const Camera& camera, Vec3 point) {
     return -camera_to_local(camera, point - camera.camera_to_world.column(3)).z;
 }
@@ -130,6 +141,31 @@ TEST(CameraRays, ProjectionInvertsThem) {
         EXPECT_TRUE(project(c.camera, {}, o - backward * 0.51f).valid);
         EXPECT_TRUE(project(c.camera, {}, o - backward * 11.9f).valid);
         EXPECT_FALSE(project(c.camera, {}, o - backward * 12.1f).valid);
+    }
+}
+
+TEST(CameraRays, ProjectionInvertsThemBehindTheLens) {
+    Random random{k_seed};
+    for (const NamedCamera& c : cameras_that_look_back()) {
+        SCOPED_TRACE(c.name);
+        for (int i = 0; i < 2000; ++i) {
+            const Vec2 film{12 * random.next() - 2, 9 * random.next() - 2},
+                lens = sample_lens(c.camera, random.next_2d());
+            const Ray ray = camera_ray(c.camera, film, lens);
+            const float t = 10 * random.next();
+            const FilmProjection back = project(c.camera, lens, ray.origin + t * ray.direction);
+            ASSERT_TRUE(back.valid);
+            ASSERT_NEAR(back.film.x, film.x, 2e-4);
+            ASSERT_NEAR(back.film.y, film.y, 2e-4);
+            ASSERT_LT(length(back.direction - ray.direction), 2e-5f);
+            const float from_lens = distance_from_lens(c.camera, ray);
+            ASSERT_NEAR(back.distance, t + from_lens, 1e-4);
+            ASSERT_LT(length(back.lens - (ray.origin - ray.direction * from_lens)), 1e-4f);
+        }
+        const Vec3 o = c.camera.camera_to_world.column(3), backward = c.camera.camera_to_world.column(2);
+        EXPECT_TRUE(project(c.camera, {}, o).valid);
+        EXPECT_TRUE(project(c.camera, {}, o + backward * 3.9f).valid);
+        EXPECT_FALSE(project(c.camera, {}, o + backward * 4.1f).valid);
     }
 }
 

@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <thread>
 
 namespace vlp::test {
 namespace {
@@ -78,6 +80,54 @@ TEST(ExactSum, ValueIsTheNearestDouble) {
     ExactSum sum;
     for (int i = 0; i < 3; ++i) sum.add(0.1f);
     EXPECT_EQ(sum.value(), 3 * static_cast<double>(0.1f));
+}
+
+// Threads that add to one sum at once: most of what they add, and it alone, makes the fraction wrap.
+TEST(ExactSum, SharedByThreadsEqualsOneThread) {
+    const auto fetch_add = [](uint64_t& word, uint64_t x) { return std::atomic_ref(word).fetch_add(x); };
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> value(0, 3);
+    std::vector<float> values(400000);
+    for (float& v : values) v = value(random);
+    ExactSum alone, shared;
+    for (const float v : values) alone.add(v);
+    std::vector<std::thread> threads;
+    for (size_t t = 0; t < 4; ++t) {
+        threads.emplace_back([&, t] {
+            for (size_t i = t; i < values.size(); i += 4) add_shared(shared, exact(values[i]), fetch_add);
+        });
+    }
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(shared.whole, alone.whole);
+    EXPECT_EQ(shared.fraction, alone.fraction);
+}
+
+TEST(ExactSum, LimitsWhatIsAdded) {
+    EXPECT_EQ(exact(0x1p62f, 1000.5f).whole, 1000);
+    EXPECT_EQ(exact(0x1p62f, 1000.5f).fraction, uint64_t{1} << 63);
+    EXPECT_EQ(exact(3, 1000.5f).whole, 3);
+    EXPECT_EQ(exact(0x1p-64f).fraction, 1u);
+}
+
+TEST(Film, SplatsAreCommittedUnlessCleared) {
+    Film film({2, 1, 3, 4}, true);
+    ASSERT_EQ(film.splats().size(), 36u);
+    for (uint32_t iteration = 0; iteration < 2; ++iteration) {
+        for (PixelSample& p : film.frame()) p = {{1, 2, 3, 1}};
+        for (size_t i = 0; i < 36; ++i) film.splats()[i].add(static_cast<float>(i));
+        film.commit_rows(0, 1);
+        film.commit_rows(1, 4);
+        film.count_iteration();
+        film.clear_splats(0, 3);
+        film.clear_splats(3, 4);
+    }
+    for (const ExactSum& s : film.splats()) EXPECT_EQ(s.value(), 0);
+    std::vector<float> rgba(48);
+    film.read(rgba);
+    for (size_t pixel = 0; pixel < 12; ++pixel) {
+        for (size_t c = 0; c < 3; ++c) EXPECT_EQ(rgba[4 * pixel + c], static_cast<float>(1 + c + 3 * pixel + c));
+        EXPECT_EQ(rgba[4 * pixel + 3], 1);  // splats have no alpha
+    }
 }
 
 void fill(Film& film, uint32_t seed) {

@@ -11,17 +11,41 @@
 
 namespace vlp::test {
 
+// Keeps the splats that fall on the film, each with its share of every pixel added up.
+struct SplatRecorder {
+    const SceneView& scene;
+    const PassSettings& pass;
+    struct Found {
+        Splat splat;
+        float on_film;  // sum of h over the pixels
+    };
+    std::vector<Found> found{};
+
+    bool wanted() const { return pass.splats; }
+    bool reaches(Vec2) const { return true; }
+    void add(const Splat& splat) {
+        float on_film = 0;
+        const Window all{0, 0, scene.camera.width, scene.camera.height};
+        for_each_pixel(pass, all, splat.film, [&](uint32_t, uint32_t, float h) { on_film += h; });
+        if (on_film > 0) found.push_back({splat, on_film});
+    }
+};
+
 // The light pass of one iteration.
 struct TracedLight {
     std::vector<LightVertex> slots;
     std::vector<uint32_t> stored;
+    std::vector<SplatRecorder::Found> splats;
     LightVertexCache cache;
 
     TracedLight(const SceneView& scene, const PassSettings& pass, uint32_t iteration)
         : slots(size_t{pass.light_paths} * pass.light_path_length) {
+        SplatRecorder recorder{scene, pass};
         for (uint32_t p = 0; p < pass.light_paths && pass.light_path_length > 0; ++p) {
-            trace_light_path(scene, pass, k_light_stream, iteration, p, &slots[size_t{p} * pass.light_path_length]);
+            LightVertex* first = &slots[size_t{p} * pass.light_path_length];
+            trace_light_path(scene, pass, k_light_stream, iteration, p, first, recorder);
         }
+        splats = std::move(recorder.found);
         for (uint32_t i = 0; i < slots.size(); ++i) {
             if (slots[i].connectible()) stored.push_back(i);
         }
@@ -86,6 +110,29 @@ inline Vec3 normal_on_light(const Light& light, Vec3 position, Vec3 x_1) {
     }
 }
 
+// y_0 ... y_{s-1} of what was found with y_{s-1} = c.vlp.
+inline reference::Path light_vertices(const SceneView& scene, const PassSettings& pass, const LightVertexCache& cache,
+                                      uint32_t iteration, const Contribution& c) {
+    const auto slot = static_cast<uint32_t>(c.vlp - cache.slots);
+    const LightVertex* y = c.vlp - (c.s - 2);  // y_1
+    const LightStart start = repeat_emission(scene, pass, iteration, slot / pass.light_path_length);
+    reference::Path path;
+    path.light = start.light;
+    path.to_infinity = -start.emission.direction;
+    path.x.emplace_back().surface.position = start.emission.position;
+    for (uint32_t i = 1; i < c.s; ++i, ++y) {
+        path.x.push_back({exact_surface(scene, y->instance, y->primitive, y->position), i + 1 < c.s && y->specular()});
+    }
+    return path;
+}
+
+// The directions and the light's normal of a path with all its vertices.
+inline void complete(const SceneView& scene, reference::Path& path) {
+    path.x[0].surface.geometric_normal =
+        normal_on_light(scene.lights[path.light], path.x[0].surface.position, path.x[1].surface.position);
+    reference::set_directions(scene, path);
+}
+
 // A sink of trace_eye_path that calls on_path(Path, Contribution) for everything found that is not black.
 template <typename F>
 struct PathRecorder {
@@ -108,7 +155,7 @@ struct PathRecorder {
         if (is_black(c.value)) return;
         reference::Path path;
         if (c.s >= 2) {
-            add_light_vertices(path, c);
+            path = light_vertices(scene, pass, cache, iteration, c);
         } else if (c.light != k_none) {
             path.light = c.light;
             path.x.emplace_back();
@@ -126,34 +173,34 @@ struct PathRecorder {
         }
         if (!hits.empty()) {
             path.x.emplace_back().surface.position = hits[0].position + to_lens;
-            if (path.light != k_none) {
-                const Light& light = scene.lights[path.light];
-                path.x[0].surface.geometric_normal =
-                    normal_on_light(light, path.x[0].surface.position, path.x[1].surface.position);
-                reference::set_directions(scene, path);
-            }
+            if (path.light != k_none) complete(scene, path);
         }
         on_path(path, c);
     }
-
-    void add_light_vertices(reference::Path& path, const Contribution& c) {
-        const auto slot = static_cast<uint32_t>(c.vlp - cache.slots);
-        const LightVertex* y = c.vlp - (c.s - 2);  // y_1
-        const LightStart start = repeat_emission(scene, pass, iteration, slot / pass.light_path_length);
-        path.light = start.light;
-        path.to_infinity = -start.emission.direction;
-        path.x.emplace_back().surface.position = start.emission.position;
-        for (uint32_t i = 1; i < c.s; ++i, ++y) {
-            path.x.push_back(
-                {exact_surface(scene, y->instance, y->primitive, y->position), i + 1 < c.s && y->specular()});
-        }
-    }
 };
+
+// The lens point of a splat from y_i: its draw once more, on the ray of the film position.
+inline Vec3 lens_of(const SceneView& scene, const PassSettings& pass, uint32_t iteration, uint32_t path, uint32_t i,
+                    Vec2 film) {
+    Sampler sampler = make_sampler(hash(hash(pass.seed, k_light_stream, iteration), k_lens_stream), path);
+    sampler.dimension = i;
+    const Ray ray = sample_ray(scene.camera, film, sampler.next_2d());
+    return ray.origin - ray.direction * distance_from_lens(scene.camera, ray);
+}
 
 // All paths of one iteration over the whole film.
 template <typename F>
 void record_paths(const SceneView& scene, const PassSettings& pass, uint32_t iteration, F on_path) {
     const TracedLight light(scene, pass, iteration);
+    for (const SplatRecorder::Found& found : light.splats) {
+        const Contribution& c = found.splat.found;
+        const auto slot = static_cast<uint32_t>(c.vlp - light.cache.slots);
+        reference::Path path = light_vertices(scene, pass, light.cache, iteration, c);
+        path.x.emplace_back().surface.position =
+            lens_of(scene, pass, iteration, slot / pass.light_path_length, c.s - 1, found.splat.film);
+        complete(scene, path);
+        on_path(path, c);
+    }
     for (uint32_t y = 0; y < scene.camera.height; ++y) {
         for (uint32_t x = 0; x < scene.camera.width; ++x) {
             PathRecorder<F&> recorder{scene, pass, light.cache, iteration, on_path};

@@ -18,6 +18,11 @@ struct Tally {
     double light[k_most][k_most] = {};
 
     void visit(const EyeWalk&) {}
+    void add(const SplatRecorder::Found& found) {
+        Contribution c = found.splat.found;
+        c.value *= found.on_film;
+        add(c);
+    }
     void add(const Contribution& c) {
         const uint32_t n = c.s + c.t;
         if (n < k_most) light[n][c.s] += static_cast<double>(average(c.value));
@@ -36,7 +41,8 @@ bool all_possible(uint32_t, uint32_t) { return true; }
 bool never_hit(uint32_t, uint32_t s) { return s > 0; }
 
 // Surfaces far enough apart that no connection is short: 1 / distance^2 has no variance otherwise.
-void add_plates(Scene& scene) {
+void add_plates(Scene& scene, CameraKind camera = CameraKind::perspective) {
+    scene.set_camera(looking(camera, {0.3f, -3.4f, 1.5f}, {0, 0.2f, 0.7f}, 0.4f, 2.5f));
     const Mesh ball = make_ball(5, 6);
     const Mesh floor = quad({-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0});
     add_surface(scene, floor, k_white, {}, tilted_normals(floor, {0.5f, 0.4f, 0}));
@@ -45,20 +51,20 @@ void add_plates(Scene& scene) {
     add_surface(scene, ball, k_red, placed_at({-0.35f, 0, 0.7f}, {0.35f, 0.35f, 0.3f}), round_normals(ball));
     add_surface(scene, ball, k_glossy, placed_at({0.6f, 0.1f, 0.8f}, {0.35f, -0.3f, 0.4f}),
                 leaning_normals(ball, 0.4f));
-    scene.set_camera(looking({0.3f, -3.4f, 1.5f}, {0, 0.2f, 0.7f}, 0.4f));
 }
 
 // The camera looks through one rough interface at a floor, from the outside of the glass.
 void add_pool(Scene& scene) {
+    scene.set_camera(looking({0.2f, -2, 2.4f}, {0, 0.2f, 0.5f}, 0.4f));
     add_surface(scene, quad({-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}), k_white);
     add_surface(scene, quad({-1, -1, 0.6f}, {1, -1, 0.6f}, {1, 1, 0.6f}, {-1, 1, 0.6f}), k_rough_glass);
     add_surface(scene, quad({-1, 1.3f, 0.9f}, {1, 1.3f, 0.9f}, {1, 1.3f, 2}, {-1, 1.3f, 2}), k_red);
-    scene.set_camera(looking({0.2f, -2, 2.4f}, {0, 0.2f, 0.5f}, 0.4f));
 }
 
 // A shining ball in a larger one that only refracts: every path leaves the light through one specular vertex, as long as
 // it does not come back to it, which takes 7 vertices. The camera does not see the balls.
 void add_lens(Scene& scene) {
+    scene.set_camera(looking({0, -0.2f, 0.75f}, {0, 0.2f, 0}, 1.0f));
     std::vector<LobeInput> lobes{lobe(LobeKind::refraction, 1)};
     const uint32_t refraction = scene.add_material(lobes, {});
     const uint32_t light = scene.add_material({}, {6, 5, 4});
@@ -67,24 +73,26 @@ void add_lens(Scene& scene) {
     add_surface(scene, quad({-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}), k_white);
     add_surface(scene, quad({-1, 1.3f, 0.4f}, {1, 1.3f, 0.4f}, {1, 1.3f, 2}, {-1, 1.3f, 2}), k_glossy);
     add_surface(scene, quad({-1.4f, 1, 0.3f}, {-1.4f, -1, 0.3f}, {-1.4f, -1, 1.5f}, {-1.4f, 1, 1.5f}), k_layered);
-    scene.set_camera(looking({0, -0.2f, 0.75f}, {0, 0.2f, 0}, 1.0f));
 }
 
 std::vector<StrategyScene> strategy_scenes() {
     const Vec3 above{0.1f, -0.2f, 2.2f};
-    const auto lit = [](void (*fill)(Scene&), std::optional<Light> light) {
+    const auto lit = [](auto fill, std::optional<Light> light) {
         return [fill, light](Scene& scene) { fill(scene), scene.add_lamp(light.value(), 0); };
+    };
+    const auto plates = [](CameraKind camera = CameraKind::perspective) {
+        return [camera](Scene& scene) { add_plates(scene, camera); };
     };
     const Rgb power{40, 36, 30};
     const Affine large = placed_at(above, {2, 1.2f, 1});
     return {
-        {"area", lit(add_plates, make_area(large, power, 1, 1, false, k_pi)), all_possible},
-        {"narrow_ellipse", lit(add_plates, make_area(large, power, 1, 1, true, 2.0f)), all_possible},
-        {"point", lit(add_plates, make_point(above, power, 0)), never_hit},
-        {"point_sphere", lit(add_plates, make_point(above, power, 0.5f)), all_possible},
-        {"spot_sphere", lit(add_plates, make_spot(placed_at(above), power, 1.6f, 0.5f, 0.4f)), all_possible},
-        {"sun", lit(add_plates, make_sun(aslant(above), power, 0)), never_hit},
-        {"sun_disc", lit(add_plates, make_sun(aslant(above), power, 1.2f)), all_possible},
+        {"area", lit(plates(), make_area(large, power, 1, 1, false, k_pi)), all_possible},
+        {"narrow_ellipse", lit(plates(), make_area(large, power, 1, 1, true, 2.0f)), all_possible},
+        {"point", lit(plates(), make_point(above, power, 0)), never_hit},
+        {"point_sphere", lit(plates(), make_point(above, power, 0.5f)), all_possible},
+        {"spot_sphere", lit(plates(), make_spot(placed_at(above), power, 1.6f, 0.5f, 0.4f)), all_possible},
+        {"sun", lit(plates(), make_sun(aslant(above), power, 0)), never_hit},
+        {"sun_disc", lit(plates(), make_sun(aslant(above), power, 1.2f)), all_possible},
         {"world", [](Scene& scene) { add_plates(scene), scene.set_world({1, 0.9f, 0.8f}); }, all_possible},
         {"mesh",
          [=](Scene& scene) {
@@ -100,6 +108,10 @@ std::vector<StrategyScene> strategy_scenes() {
              scene.add_lamp(make_area(large, power, 1, 1, false, k_pi).value(), 0);
          },
          all_possible},
+        {"orthographic", lit(plates(CameraKind::orthographic), make_area(large, power, 1, 1, false, k_pi)),
+         all_possible},
+        {"thin_lens", lit(plates(CameraKind::thin_lens), make_area(large, power, 1, 1, false, k_pi)), all_possible},
+        {"orthographic_lens", lit(plates(CameraKind::orthographic_lens), make_point(above, power, 0.5f)), all_possible},
         {"rough_glass", lit(add_pool, make_area(large, power, 1, 1, false, k_pi)), all_possible},
         {"lens", add_lens, [](uint32_t n, uint32_t s) { return n <= 6 && s != 1 && s != 2; }},
     };
@@ -118,7 +130,7 @@ TEST_P(StrategiesTest, FindTheSameLight) {
     scene.build(1);
     PassSettings pass;
     pass.light_path_length = 3, pass.eye_path_length = 5;
-    pass.light_paths = 1500, pass.vlp_connections = 6, pass.light_samples = 2;
+    pass.light_paths = 1500, pass.vlp_connections = 6, pass.light_samples = 2, pass.splats = true;
     pass = with_kappa(scene.view(), pass);
 
     std::vector<Tally> batches(k_batches);
@@ -126,6 +138,7 @@ TEST_P(StrategiesTest, FindTheSameLight) {
         pass.seed = b;  // batches are independent, iterations of one seed are stratified
         for (uint32_t iteration = 0; iteration < k_iterations; ++iteration) {
             const TracedLight light(scene.view(), pass, iteration);
+            for (const SplatRecorder::Found& found : light.splats) batches[b].add(found);
             for (uint32_t i = 0; i < k_pixels * k_pixels; ++i) {
                 trace_eye_path(scene.view(), pass, light.cache, iteration, i % k_pixels, i / k_pixels, batches[b]);
             }
@@ -142,7 +155,7 @@ TEST_P(StrategiesTest, FindTheSameLight) {
     std::vector<Pair> pairs;
     for (uint32_t n = 3; n < k_most; ++n) {
         std::vector<Estimate> all;
-        for (uint32_t s = 0; s + 2 <= n && s <= pass.light_path_length + 1; ++s) {
+        for (uint32_t s = 0; s + 1 <= n && s <= pass.light_path_length + 1; ++s) {
             if (n - s > pass.eye_path_length + 1 || !GetParam().possible(n, s)) continue;
             double sum = 0, squares = 0;
             for (const Tally& t : batches) sum += t.light[n][s], squares += t.light[n][s] * t.light[n][s];

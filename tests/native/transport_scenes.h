@@ -139,6 +139,19 @@ inline Camera looking(Vec3 eye, Vec3 target, float half_size) {
     return camera;
 }
 
+// The cameras that look alike: a pinhole, parallel rays, and both with a lens.
+enum class CameraKind { perspective, orthographic, thin_lens, orthographic_lens };
+
+// `width` (metres) of what orthographic cameras show; those with a lens focus on `target`.
+inline Camera looking(CameraKind kind, Vec3 eye, Vec3 target, float half_size, float width) {
+    const bool parallel = kind == CameraKind::orthographic || kind == CameraKind::orthographic_lens;
+    Camera camera = looking(eye, target, parallel ? 0.5f * width : half_size);
+    if (parallel) camera.projection = Projection::orthographic;
+    if (kind == CameraKind::thin_lens || kind == CameraKind::orthographic_lens) camera.aperture_radius = 0.2f;
+    camera.focus_distance = length(target - eye);
+    return camera;
+}
+
 struct NamedLight {
     std::string name;
     std::function<void(Scene&)> add;
@@ -178,7 +191,8 @@ inline std::vector<NamedLight> every_light() {
 }
 
 // A room with every kind of surface, lit by `add_lights`.
-inline std::unique_ptr<Scene> crowded_room(const std::function<void(Scene&)>& add_lights, uint32_t pixels) {
+inline std::unique_ptr<Scene> crowded_room(const std::function<void(Scene&)>& add_lights, uint32_t pixels,
+                                           CameraKind camera = CameraKind::perspective) {
     auto scene = std::make_unique<Scene>();
     add_materials(*scene);
     const Mesh floor = quad({-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0});
@@ -200,7 +214,7 @@ inline std::unique_ptr<Scene> crowded_room(const std::function<void(Scene&)>& ad
     // One interface alone: what a closed body does to solid angles on the way in, it undoes on the way out.
     add_surface(*scene, quad({-0.8f, -0.9f, 1.2f}, {0, -0.9f, 1.2f}, {0, 0.4f, 1.3f}, {-0.8f, 0.4f, 1.3f}), k_glass);
     add_lights(*scene);
-    scene->set_camera(looking({0, -3.2f, 1.1f}, {0, 0, 0.8f}, 0.45f));
+    scene->set_camera(looking(camera, {0, -3.2f, 1.1f}, {0, 0, 0.8f}, 0.45f, 2.2f));
     scene->set_film(pixels, pixels, {0, 0, pixels, pixels}, false);
     scene->build(1);
     return scene;

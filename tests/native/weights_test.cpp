@@ -15,9 +15,11 @@ namespace {
 struct Counts {
     uint32_t light, eye;  // L, K
     uint32_t paths, connections, samples;  // N, C, S
+    bool splats = true, hits = true;
 };
-constexpr Counts k_counts[] = {{0, 4, 300, 1, 1}, {1, 1, 300, 1, 2}, {1, 5, 500, 2, 1},
-                               {3, 4, 200, 3, 4}, {6, 2, 200, 1, 3}, {5, 5, 100, 2, 1}};
+constexpr Counts k_counts[] = {{0, 4, 300, 1, 1, false}, {1, 1, 300, 1, 2},  {1, 5, 500, 2, 1, false},
+                               {3, 4, 1500, 3, 4},       {6, 2, 3000, 1, 3}, {5, 5, 1500, 2, 1},
+                               {3, 3, 1500, 0, 1},       {2, 4, 300, 1, 0},  {2, 4, 300, 2, 1, true, false}};
 
 // Whether rounding leaves the path's densities be: edges are long beside the offsets of ray origins, and no surface is met
 // at so flat an angle that the rounded directions and normals of a light vertex change its cosine much.
@@ -44,14 +46,16 @@ bool lies_on(const Light& light, Vec3 position) {
     return u > -1e-3f && v > -1e-3f && u + v < 1.001f && std::fabs(dot(d, light.normal)) < 1e-4f;
 }
 
-// Relative errors of the weights of one strategy s.
+// Relative errors of the weights of strategies with the same s; those with t = 1 apart.
 struct Errors {
     std::vector<double> good, rest;  // of well-conditioned paths and of others
     size_t wrong = 0;                // of the good ones, more than rounding explains
     std::string example;             // of those
 };
 constexpr uint32_t k_most_light_vertices = 8;
-using ErrorsByStrategy = std::array<Errors, k_most_light_vertices>;
+struct ErrorsByStrategy {
+    std::array<Errors, k_most_light_vertices> joined, splats;
+};
 
 void compare_weights(const SceneView& scene, const PassSettings& pass, uint32_t iteration, ErrorsByStrategy& errors) {
     record_paths(scene, pass, iteration, [&](const reference::Path& path, const Contribution& c) {
@@ -69,7 +73,7 @@ void compare_weights(const SceneView& scene, const PassSettings& pass, uint32_t 
         for (const double x : w) sum += x;
         ASSERT_NEAR(sum, 1, 1e-6);
         const double error = std::fabs(c.weight / w[c.s] - 1);
-        Errors& of_strategy = errors[c.s];
+        Errors& of_strategy = (c.t == 1 ? errors.splats : errors.joined)[c.s];
         if (!well_conditioned(path)) {
             of_strategy.rest.push_back(error);
             return;
@@ -90,11 +94,18 @@ double quantile(std::vector<double> errors, double q) {
     return errors.empty() ? 0 : errors[static_cast<size_t>(q * static_cast<double>(errors.size() - 1))];
 }
 
-class WeightsTest : public ::testing::TestWithParam<NamedLight> {};
+struct LightAndCamera {
+    NamedLight light;
+    CameraKind camera = CameraKind::perspective;
+
+    friend void PrintTo(const LightAndCamera& p, std::ostream* out) { *out << p.light.name; }
+};
+
+class WeightsTest : public ::testing::TestWithParam<LightAndCamera> {};
 
 TEST_P(WeightsTest, EqualTheReference) {
     constexpr uint32_t k_pixels = 20;
-    const auto scene = crowded_room(GetParam().add, k_pixels);
+    const auto scene = crowded_room(GetParam().light.add, k_pixels, GetParam().camera);
     ErrorsByStrategy errors;
     for (const Counts& counts : k_counts) {
         for (const Weighting weighting : {Weighting::uniform, Weighting::balance, Weighting::power}) {
@@ -104,6 +115,8 @@ TEST_P(WeightsTest, EqualTheReference) {
             pass.light_paths = counts.paths;
             pass.vlp_connections = counts.connections;
             pass.light_samples = counts.samples;
+            pass.splats = counts.splats;
+            pass.hits = counts.hits;
             pass.weighting = weighting;
             pass.roulette = counts.light == 5;
             pass.seed = 11;
@@ -115,14 +128,16 @@ TEST_P(WeightsTest, EqualTheReference) {
         }
     }
     std::vector<double> good, rest;
-    for (const Errors& e : errors) {
+    std::vector<Errors> all(errors.joined.begin(), errors.joined.end());
+    all.insert(all.end(), errors.splats.begin(), errors.splats.end());
+    for (const Errors& e : all) {
         // Directions leave from offset origins, and light vertices round theirs and their normals: of 10,000 well-conditioned
         // paths about one is off by more, at the edge of a lobe or by a curved mirror. Paths share such light vertices.
         EXPECT_LE(e.wrong, 2 + e.good.size() / 200) << e.good.size() << " weights of this strategy; " << e.example;
         good.insert(good.end(), e.good.begin(), e.good.end());
         rest.insert(rest.end(), e.rest.begin(), e.rest.end());
     }
-    if (GetParam().name == "ellipsoid") return;  // found by hits alone
+    if (GetParam().light.name == "ellipsoid") return;  // found by hits alone
     std::printf(
         "  %zu weights, %.0f %% of them well-conditioned: errors of these, median %.1e, 99.9 %% %.1e, 99.99 %% %.1e; "
         "of the rest, 99 %% %.1e\n",
@@ -131,12 +146,35 @@ TEST_P(WeightsTest, EqualTheReference) {
         quantile(good, 0.999), quantile(good, 0.9999), quantile(rest, 0.99));
     EXPECT_GT(good.size(), 10000u);
     EXPECT_GT(good.size(), 4 * rest.size());
-    for (uint32_t s = 1; s <= 4; ++s) EXPECT_GT(errors[s].good.size(), 100u) << "s = " << s;
+    for (uint32_t s = 1; s <= 4; ++s) EXPECT_GT(errors.joined[s].good.size(), 100u) << "s = " << s;
+    for (uint32_t s = 2; s <= 7; ++s)
+        EXPECT_GT(errors.splats[s].good.size(), s < 5 ? 100u : 50u) << "splats, s = " << s;
     EXPECT_LT(quantile(rest, 0.99), 1e-2);
 }
 
-INSTANTIATE_TEST_SUITE_P(Lights, WeightsTest, ::testing::ValuesIn(every_light()),
-                         [](const auto& test) { return test.param.name; });
+std::vector<LightAndCamera> lights_before_a_pinhole() {
+    std::vector<LightAndCamera> all;
+    for (const NamedLight& light : every_light()) all.push_back({light});
+    return all;
+}
+
+INSTANTIATE_TEST_SUITE_P(Lights, WeightsTest, ::testing::ValuesIn(lights_before_a_pinhole()),
+                         [](const auto& test) { return test.param.light.name; });
+
+INSTANTIATE_TEST_SUITE_P(Cameras, WeightsTest,
+                         ::testing::Values(LightAndCamera{every_light().back(), CameraKind::orthographic},
+                                           LightAndCamera{every_light().back(), CameraKind::thin_lens},
+                                           LightAndCamera{every_light().back(), CameraKind::orthographic_lens}),
+                         [](const auto& test) {
+                             switch (test.param.camera) {
+                                 case CameraKind::orthographic:
+                                     return "orthographic";
+                                 case CameraKind::thin_lens:
+                                     return "thin_lens";
+                                 default:
+                                     return "orthographic_lens";
+                             }
+                         });
 
 }  // namespace
 }  // namespace vlp::test

@@ -39,6 +39,7 @@ class FakeRenderer:
         self.scene, self.settings = scene, settings
         self.next = settings["iteration_begin"]
         self.iterations, self.total, self.vlps, self.dropped = 0, 0, 7, 0
+        self.light_paths = settings["light_paths"]
         self.deadline = float("inf")
         self.asked: list[int] = []
         self.threads: set[str] = set()

@@ -55,7 +55,7 @@ CASES = [
     Case("bumpy_furnace", iterations=32, cycles=32, mitsuba=32, other=("mitsuba", SHADING_HORIZON)),
     Case("mis_plates", iterations=256, cycles=128, mitsuba=256),
     Case("thousand_lights", iterations=128, cycles=64, mitsuba=128),
-    Case("sun_and_glass", iterations=256, cycles=64, mitsuba=128),
+    Case("sun_and_glass", iterations=512, cycles=128, mitsuba=128),
     Case("sky", iterations=32, cycles=32, mitsuba=32),
     Case("depth_of_field", iterations=64, cycles=160, mitsuba=256),
     Case("scaled_emitters", iterations=128, cycles=64, mitsuba=256),

@@ -33,7 +33,7 @@ from scenes_for_tests import (
 from vlp_bpt import Scene, materials
 from vlp_bpt.scene import AreaLight, Material, Mesh, PointLight, Spheres, SpotLight, SunLight, Visibility, World
 
-HITS_ONLY: dict[str, Any] = {"light_samples": 0, "vlp_connections": 0}
+HITS_ONLY: dict[str, Any] = {"light_samples": 0, "vlp_connections": 0, "splats": False}
 DIRECT: dict[str, Any] = {"light_path_length": 0, "vlp_connections": 0, "eye_path_length": 2}
 
 
@@ -95,28 +95,35 @@ def lit_inside(albedo: float = 0.7) -> Scene:
     return scene
 
 
+@pytest.mark.parametrize("splats", [False, True])
 @pytest.mark.parametrize(
     ("L", "K", "C", "S"),
-    [(0, 1, 1, 1), (0, 4, 1, 2), (3, 3, 0, 1), (1, 1, 1, 1), (1, 3, 3, 1), (3, 1, 1, 1), (3, 2, 1, 1), (2, 5, 2, 3),
-     (5, 5, 1, 1)],
+    [(0, 1, 1, 1), (0, 4, 1, 2), (3, 3, 0, 1), (5, 2, 0, 1), (1, 1, 1, 1), (1, 3, 3, 1), (3, 1, 1, 1), (3, 2, 1, 1),
+     (2, 5, 2, 3), (5, 5, 1, 1)],
 )  # fmt: skip
-def test_windows_lose_exactly_the_longer_paths(L: int, K: int, C: int, S: int) -> None:
-    """The longest path has K + 1 vertices of the eye walk and L + 1 of the light walk, or 1 where no VLP is joined."""
-    longest = K + 1 + (L + 1 if L > 0 and C > 0 else 1)
+def test_windows_lose_exactly_the_longer_paths(L: int, K: int, C: int, S: int, splats: bool) -> None:
+    """The longest path has K + 1 vertices of the eye walk and L + 1 of the light walk, or 1 where no VLP is joined; a
+    splat has L + 1 and the lens."""
+    longest = max(K + 1 + (L + 1 if L > 0 and C > 0 else 1), L + 2 if splats and L > 0 else 0)
     expected = 100 / (4 * pi**2 * 2**2) * sum(0.7 ** (n - 2) for n in range(3, longest + 1)) * np.array([1, 0.5, 0.25])
     options = settings(
-        samples=64, light_path_length=L, eye_path_length=K, vlp_connections=C, light_samples=S, light_paths=200
-    )
+        samples=64, light_path_length=L, eye_path_length=K, vlp_connections=C, light_samples=S, light_paths=200,
+        splats=splats,
+    )  # fmt: skip
     pictures = blocks(batches(lit_inside(), options, 12), 8)
-    assert_mean(pictures, expected, f"L {L}, K {K}, C {C}, S {S}", rounding=1e-4)
+    assert_mean(pictures, expected, f"L {L}, K {K}, C {C}, S {S}, splats {splats}", rounding=1e-4)
 
 
+@pytest.mark.parametrize("splats", [False, True])
 @pytest.mark.parametrize(("L", "K"), [(2, 2), (4, 3)])
-def test_virtual_light_points_without_light_samples(L: int, K: int) -> None:
-    """S = 0: no hits on a point light either, so the shortest path has two vertices of the light walk."""
-    lengths = range(4, K + 1 + L + 1 + 1)
+def test_light_paths_without_light_samples(L: int, K: int, splats: bool) -> None:
+    """S = 0: no hits on a point light either, so the shortest path has two vertices of the light walk and, but for
+    splats, two of the eye walk."""
+    lengths = range(3 if splats else 4, K + 1 + L + 1 + 1)
     expected = 100 / (4 * pi**2 * 2**2) * sum(0.7 ** (n - 2) for n in lengths) * np.array([1, 0.5, 0.25])
-    options = settings(samples=64, light_path_length=L, eye_path_length=K, light_samples=0, light_paths=200)
+    options = settings(
+        samples=64, light_path_length=L, eye_path_length=K, light_samples=0, light_paths=200, splats=splats
+    )
     assert_mean(blocks(batches(lit_inside(), options, 12), 8), expected, f"L {L}, K {K}", rounding=1e-4)
 
 

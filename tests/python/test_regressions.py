@@ -39,7 +39,7 @@ EYE_ONLY: dict[str, Any] = {"light_path_length": 0, "eye_path_length": 6, "vlp_c
 
 
 def pictures(scene: Scene, seed: int, **options: Any) -> Array:
-    return blocks(batches(scene, settings(**({"samples": 128} | options)), 16, seed))
+    return blocks(batches(scene, settings(**({"samples": 128} | options)), 24, seed))
 
 
 def tilted(mesh: Mesh, by: float) -> Mesh:
@@ -68,7 +68,7 @@ def grid(side: float, cells: int) -> Mesh:
 def floor_lit_by_a_wall(normals: float) -> Scene:
     """The lamp shines at the wall alone: all light on the floor has bounced."""
     wall = quad((-1.5, 1.2, 0), (1.5, 1.2, 0), (1.5, 1.2, 2), (-1.5, 1.2, 2), name="wall")
-    builder = Builder(16, looking((0.4, -2.6, 2.4), (0, 0, 0.2), 0.5))
+    builder = Builder(16, looking((0.4, -2.0, 2.2), (0, 0.1, 0.1), 0.36))
     builder.add(tilted(grid(2.4, 6), normals), grey(0.8)).add(wall, grey(0.8))
     toward_wall = np.array([[1, 0, 0, 0], [0, 0, -1, 0.1], [0, 1, 0, 1.0]], np.float32)  # -z of the lamp is +y
     builder.scene.lights = [AreaLight("lamp", toward_wall, (30, 30, 30), (0.6, 0.6))]
@@ -107,9 +107,8 @@ def test_mirrored_emitter_that_scatters_indirectly() -> None:
     assert_same_mean(pictures(scene, 0, **BOTH_WAYS), pictures(scene, 1000, **EYE_ONLY), "mirrored emitter")
 
 
-@pytest.mark.parametrize("L", [3, 8])
-def test_point_light_in_a_box_gives_no_firefly(L: int) -> None:
-    """mitsuba issue 132: no pixel of any of 256 pictures of one sample is brighter than balanced weights allow.
+def test_point_light_in_a_box_gives_no_firefly() -> None:
+    """mitsuba issue 132: no pixel of any of 128 pictures of one sample is brighter than balanced weights allow.
 
     A weighted sample of a strategy is the path's light over the sum of all strategies' densities, so at most what next
     event alone would give: I / (pi d^2) a^(n - 2) for n vertices, with all surfaces farther than d from the lamp. A
@@ -123,8 +122,8 @@ def test_point_light_in_a_box_gives_no_firefly(L: int) -> None:
 
     def brightest(weighting: str) -> float:
         # N paths for as many pixels, so that one light path weighs as much as one eye path
-        options = {"samples": 1, "light_paths": 256, "light_path_length": L, "eye_path_length": 40}
-        return float(batches(scene, settings(weighting=weighting, **options), 256).max())
+        options = {"samples": 1, "light_paths": 256, "light_path_length": 3, "eye_path_length": 24}
+        return float(batches(scene, settings(weighting=weighting, **options), 128).max())
 
     found = {weighting: brightest(weighting) for weighting in ("BALANCE", "UNIFORM")}
     print(f"brightest pixel {found}, bound {bound:.2f}")
@@ -159,9 +158,7 @@ def test_transparent_shadows_on_light_paths() -> None:
     assert_same_mean(pictures(scene, 0, **BOTH_WAYS), pictures(scene, 1000, **EYE_ONLY), "tinted sheets")
 
 
-@pytest.mark.parametrize(
-    "options", [BOTH_WAYS, EYE_ONLY, {**BOTH_WAYS, "light_samples": 0}], ids=["both", "eye", "no_next_event"]
-)
+@pytest.mark.parametrize("options", [BOTH_WAYS, EYE_ONLY], ids=["both", "eye"])
 def test_clear_sheets_change_nothing(options: dict[str, Any]) -> None:
     """A sheet that lets all light through counts neither in a path's length nor in its weights."""
     clear, without = behind_tinted_sheets((1, 1, 1)), behind_tinted_sheets((1, 1, 1))

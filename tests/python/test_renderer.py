@@ -56,7 +56,10 @@ def test_everything_is_uploaded(fake: Any) -> None:
     assert native.arguments("add_spot_light")[0][1:] == ((1.0, 1.0, 1.0), 1.0, 0.5, 0.1, 1)
     assert native.arguments("add_sun_light")[0][1:] == ((2.0, 2.0, 2.0), 0.01, 1)
     assert native.arguments("add_area_light")[0][1:] == ((3.0, 3.0, 3.0), 0.5, 0.25, True, 1.5, 1)
-    assert native.arguments("set_world") == [((0.1, 0.2, 0.4),)]
+    ((texels, to_image),) = native.arguments("set_world_image")
+    assert scene.world.image is not None
+    assert texels == pytest.approx(scene.world.image * (0.1, 0.2, 0.4))
+    assert to_image.tolist() == [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
     assert native.arguments("set_film") == [(64, 48, 3, 5, 20, 10, True)]
     assert native.calls[-1][0] == "build"
 
@@ -79,7 +82,7 @@ def test_settings_go_resolved(fake: Any) -> None:
         1,
         192,
     )
-    assert all(type(value) in (str, int, float) for value in sent.values())
+    assert all(type(value) in (str, int, float, bool) for value in sent.values())
 
 
 # The flow of a render

@@ -15,9 +15,9 @@ from vlp_bpt.settings import FROM_MODE, MODE_PRESETS, Device
 @pytest.mark.parametrize(
     ("mode", "expected"),
     [
-        (Mode.PAPER, (1, 5, 1, 1, Weighting.UNIFORM)),
-        (Mode.BALANCED, (3, 8, 1, 1, Weighting.BALANCE)),
-        (Mode.REFERENCE, (64, 64, 1, 1, Weighting.BALANCE)),
+        (Mode.PAPER, (1, 5, 1, 1, False, Weighting.UNIFORM)),
+        (Mode.BALANCED, (3, 8, 1, 1, True, Weighting.BALANCE)),
+        (Mode.REFERENCE, (64, 64, 1, 1, True, Weighting.BALANCE)),
     ],
 )
 def test_a_mode_fills_what_is_open(mode: Mode, expected: tuple[Any, ...]) -> None:
@@ -27,9 +27,11 @@ def test_a_mode_fills_what_is_open(mode: Mode, expected: tuple[Any, ...]) -> Non
         settings.eye_path_length,
         settings.vlp_connections,
         settings.light_samples,
+        settings.splats,
         settings.weighting,
     )
     assert found == expected
+    assert settings.hits
     assert settings.light_paths == 5000
 
 
@@ -41,6 +43,7 @@ def test_what_is_set_stays(mode: Mode) -> None:
         "light_paths": 17,
         "vlp_connections": 0,
         "light_samples": 4,
+        "splats": mode is Mode.PAPER,
         "weighting": Weighting.POWER,
     }
     assert values.keys() == set(FROM_MODE)
@@ -81,6 +84,9 @@ def test_automatic_light_paths_without_light_path_length(mode: Mode) -> None:
         ("vlp_connections", -1, "vlp_connections = -1: must be from 0 to 1024"),
         ("filter_width", 0.0, "filter_width = 0.0: must be from 0.01 to 10"),
         ("seed", 2**32, "seed = 4294967296: must be from 0 to 4294967295"),
+        ("splats", 1, "splats = 1: must be on or off"),
+        ("hits", None, "hits = None: must be on or off"),
+        ("hits", "yes", "hits = 'yes': must be on or off"),
         ("mode", "FAST", "mode = 'FAST': must be one of PAPER, BALANCED, REFERENCE"),
         ("weighting", "MAXIMUM", "weighting = 'MAXIMUM': must be one of UNIFORM, BALANCE, POWER"),
         ("filter", 3, "filter = 3: must be one of BOX, GAUSSIAN, BLACKMAN_HARRIS"),
@@ -97,8 +103,11 @@ def test_a_bad_value_is_named(name: str, value: Any, message: str) -> None:
 
 
 def test_values_come_to_their_types() -> None:
-    settings = RenderSettings(mode="PAPER", samples=np.int64(3), time_limit=2, weighting="POWER", device="CPU")  # type: ignore[arg-type]
+    settings = RenderSettings(
+        mode="PAPER", samples=np.int64(3), time_limit=2, splats=np.True_, weighting="POWER", device="CPU"
+    )  # type: ignore[arg-type]
     settings.validate()
+    assert settings.splats is True
     assert settings.mode is Mode.PAPER
     assert settings.weighting is Weighting.POWER
     assert settings.device is Device.CPU
@@ -136,6 +145,12 @@ def test_settings_from_text() -> None:
     assert RenderSettings.from_strings(texts) == expected
 
 
+@pytest.mark.parametrize(("text", "value"), [("on", True), ("OFF", False), ("true", True), ("no", False), ("1", True)])
+def test_switches_from_text(text: str, value: bool) -> None:
+    assert RenderSettings.from_strings({"splats": text, "hits": text}) == RenderSettings(splats=value, hits=value)
+    assert RenderSettings.from_strings({"splats": "auto"}).splats is None
+
+
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
@@ -144,6 +159,8 @@ def test_settings_from_text() -> None:
         ("samples", "auto", "samples = 'auto': must be a whole number"),
         ("time_limit", "", "time_limit = '': must be a number"),
         ("time_limit", "inf", "time_limit = inf: must be from 0 to 1000000000"),
+        ("splats", "maybe", "splats = 'maybe': must be on or off"),
+        ("hits", "auto", "hits = 'auto': must be on or off"),
         ("mode", "slow", "mode = 'SLOW': must be one of PAPER, BALANCED, REFERENCE"),
     ],
 )
@@ -154,10 +171,10 @@ def test_bad_text_is_named(name: str, text: str, message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "settings", [RenderSettings(), RenderSettings(mode=Mode.REFERENCE, samples=5, light_samples=2)]
+    "settings", [RenderSettings(), RenderSettings(mode=Mode.REFERENCE, samples=5, light_samples=2, splats=False)]
 )
 def test_settings_survive_a_dictionary(settings: RenderSettings) -> None:
     values = settings.to_dict()
-    assert all(type(value) in (str, int, float, type(None)) for value in values.values())
+    assert all(type(value) in (str, int, float, bool, type(None)) for value in values.values())
     assert RenderSettings.from_dict(values) == settings
     assert RenderSettings.from_dict(settings.resolved(9, 9).to_dict()).resolved(9, 9) == settings.resolved(9, 9)
