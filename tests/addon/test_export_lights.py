@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import bpy
 import bpy_scenes as scenes
 import numpy as np
+import OpenImageIO
 import pytest
 
 from addon.export.notes import Notes
@@ -224,7 +226,10 @@ def test_negative_light_of_the_world_is_named() -> None:
 
 
 def environment(made: Any) -> Any:
-    """An Environment Texture that feeds the world's Background, of an image of 8 x 4 linear pixels."""
+    """An Environment Texture that feeds the world's Background, and the (4, 8, 3) colours of its image.
+
+    Its alpha is kept apart from the colours, which Cycles multiplies by it from 5.0 on.
+    """
     tree = made.node_tree
     node = tree.nodes.new("ShaderNodeTexEnvironment")
     background = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBackground")
@@ -232,16 +237,16 @@ def environment(made: Any) -> Any:
     node.image = bpy.data.images.new("sky", 8, 4, float_buffer=True)
     pixels = np.random.default_rng(1).random((4, 8, 4)).astype(np.float32)
     node.image.pixels.foreach_set(pixels.ravel())
-    return node, pixels
+    return node, pixels[..., :3] * (pixels[..., 3:] if bpy.app.version >= (5, 0, 0) else 1.0)
 
 
 def test_a_world_image() -> None:
-    _, pixels = environment(world(Strength=2))
+    _, colors = environment(world(Strength=2))
     notes = Notes()
     found = scenes.export(notes).world
     assert notes.warnings == []
     assert found.radiance == (1, 1, 1)
-    assert found.image == pytest.approx(2 * pixels[..., :3] * pixels[..., 3:])
+    assert found.image == pytest.approx(2 * colors)
     assert (found.rotation == np.eye(3)).all()
 
 
@@ -271,6 +276,23 @@ def test_a_world_image_in_bytes_is_made_linear() -> None:
     assert found[0, 1] == pytest.approx((0.0016, 0.0331, 0.6038), abs=2e-3)
 
 
+def test_bytes_are_multiplied_by_alpha_as_encoded() -> None:
+    node, _ = environment(world())
+    node.image = bpy.data.images.new("bytes", 1, 1, alpha=True)
+    node.image.pixels.foreach_set(np.array([1, 0.5, 0, 0.5], np.float32))
+    middle, dark = (((x + 0.055) / 1.055) ** 2.4 for x in (0.5, 0.25))
+    assert scenes.export().world.image[0, 0] == pytest.approx((middle, dark, 0), rel=0.02)
+
+
+def test_float_files_are_multiplied_by_alpha_once(tmp_path: Path) -> None:
+    pixels = np.array([[[0.8, 0.4, 0.2, 0.5]]], np.float32)
+    OpenImageIO.ImageBuf(pixels).write(str(tmp_path / "apart.exr"))
+    node, _ = environment(world())
+    node.image = bpy.data.images.load(str(tmp_path / "apart.exr"))
+    node.image.alpha_mode = "STRAIGHT"
+    assert scenes.export().world.image[0, 0] == pytest.approx((0.4, 0.2, 0.1), rel=1e-3)
+
+
 def test_a_missing_world_image_is_named_with_its_file() -> None:
     node, _ = environment(world(Strength=2))
     node.image = bpy.data.images.new("gone.hdr", 8, 4)
@@ -292,7 +314,7 @@ def test_a_world_without_its_image_is_magenta() -> None:
 def test_world_images_are_added(alike: bool) -> None:
     """Of one size and rotation texel by texel; else the second counts as its mean over directions."""
     made = world(Strength=2)
-    _, pixels = environment(made)
+    _, colors = environment(made)
     tree = made.node_tree
     other, second = tree.nodes.new("ShaderNodeTexEnvironment"), tree.nodes.new("ShaderNodeBackground")
     other.image = bpy.data.images.new("other", 8, 4 if alike else 90, float_buffer=True)
@@ -306,8 +328,7 @@ def test_world_images_are_added(alike: bool) -> None:
     tree.links.new(both.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
     notes = Notes()
     found = scenes.export(notes).world
-    first = 2 * pixels[..., :3] * pixels[..., 3:]
-    assert found.image == pytest.approx(first + (white[..., :3] if alike else 0.25), rel=1e-3)
+    assert found.image == pytest.approx(2 * colors + (white[..., :3] if alike else 0.25), rel=1e-3)
     assert len(notes.warnings) == (0 if alike else 1)
 
 
