@@ -8,8 +8,10 @@ from typing import Any
 last: dict[tuple[str, str], list[tuple[str, str]]] = {}
 
 
-def lines(statistics: Any, total_seconds: float, warnings: list[str]) -> list[tuple[str, str]]:
-    """(label, value) for the panel, from `vlp_bpt.Statistics`."""
+def lines(
+    statistics: Any, total_seconds: float, lost: tuple[float, float], warnings: list[str]
+) -> list[tuple[str, str]]:
+    """(label, value) for the panel, from `vlp_bpt.Statistics` and `Renderer.lost_light`."""
     rows = [
         ("Iterations", f"{statistics.iterations:,}"),
         ("Render Time", duration(statistics.seconds)),
@@ -19,6 +21,8 @@ def lines(statistics: Any, total_seconds: float, warnings: list[str]) -> list[tu
         ("Virtual Lights", f"{statistics.vlps:,}"),
         ("Memory", memory(statistics.memory_bytes)),
     ]
+    share, error = lost
+    rows.append(("Lost Light", f"{100 * share:.1f} % ± {100 * error:.1f} %, in longer paths"))
     if statistics.dropped:
         rows.append(("Dropped Samples", f"{statistics.dropped:,}"))
     return rows + [("Warning", warning) for warning in warnings]

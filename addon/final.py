@@ -230,7 +230,7 @@ def _record(engine: Any, depsgraph: Any, renderer: Any, seconds: float, warnings
     """Keeps the statistics for the panel, and stamps them into the result for the files that are written from it."""
     taken = renderer.statistics
     layer = depsgraph.view_layer.name
-    figures.last[(depsgraph.scene.name, layer)] = figures.lines(taken, seconds, warnings)
+    figures.last[(depsgraph.scene.name, layer)] = figures.lines(taken, seconds, renderer.lost_light(), warnings)
     result = engine.get_result()
     if result is None:
         return

@@ -63,6 +63,13 @@ def progress_text(statistics: Statistics, progress: Progress) -> str:
     return ", ".join(parts)
 
 
+def lost_light_text(share: float, error: float) -> str:
+    """What a user should know about light that the path lengths lose; nothing where it is too little to be seen."""
+    if share < 0.005 or share < 3 * error:
+        return ""
+    return f", {100 * share:.1f} % of the light missing (it takes longer paths than the settings allow)"
+
+
 def summary_text(statistics: Statistics) -> str:
     """The closing line of a render: iterations, seconds, samples per second and what else it took."""
     parts = [

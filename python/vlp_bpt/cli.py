@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import __version__, metrics
-from ._progress import ProgressDisplay, summary_text
+from ._progress import ProgressDisplay, lost_light_text, summary_text
 from .errors import Cancelled, DeviceError, Error, SceneError
 from .images import Depth, check_output, read_image, write_image
 from .merge import merge_images
-from .render import Renderer, Statistics, devices, load_native, native_errors
+from .render import Renderer, devices, load_native, native_errors
 from .scene import Mesh, Scene
 from .settings import FROM_MODE, Device, RenderSettings
 from .snapshot import SUFFIX, Snapshot, load_snapshot, save_snapshot, scene_digest
@@ -203,7 +203,7 @@ def _render(options: argparse.Namespace) -> int:
         image.metadata["scene"] = scene_digest(snapshot.scene)
         image.film_state = renderer.film_state()
     write_image(options.output, image, options.depth)
-    return _finish(options.output, renderer.statistics, renderer.interrupted)
+    return _finish(options.output, renderer)
 
 
 def _render_blend(options: argparse.Namespace, values: dict[str, Any]) -> int:
@@ -215,7 +215,7 @@ def _render_blend(options: argparse.Namespace, values: dict[str, Any]) -> int:
     if not result.renderers:
         raise SceneError(f"'{options.file}': Blender did not render it with VLP-BPT")
     for renderer in result.renderers:
-        code = _finish(options.output, renderer.statistics, renderer.interrupted)
+        code = _finish(options.output, renderer)
     return code
 
 
@@ -376,9 +376,13 @@ def _warn(warnings: list[str]) -> None:
         print(f"vlp-bpt: warning: {warning}", file=sys.stderr)
 
 
-def _finish(output: Path, statistics: Statistics, interrupted: bool) -> int:
-    print(f"{output}: {summary_text(statistics)}{' (interrupted)' if interrupted else ''}")
-    return INTERRUPTED if interrupted else 0
+def _finish(output: Path, renderer: Renderer) -> int:
+    summary = summary_text(renderer.statistics)
+    if renderer.interrupted:
+        print(f"{output}: {summary} (interrupted)")
+        return INTERRUPTED
+    print(f"{output}: {summary}{lost_light_text(*renderer.lost_light())}")
+    return 0
 
 
 def _scene_text(scene: Scene) -> str:

@@ -49,6 +49,9 @@ class FakeRenderer:
         if self.iterations == 0:
             raise Cancelled("cancelled")
 
+    def lost_light(self) -> tuple[float, float]:
+        return 0.021, 0.004
+
     def read(self, out: Any) -> Any:
         film = self.scene.film
         x, y, width, height = film.window or (0, 0, film.width, film.height)

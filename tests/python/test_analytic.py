@@ -30,8 +30,20 @@ from scenes_for_tests import (
     transform,
 )
 
-from vlp_bpt import Scene, materials
-from vlp_bpt.scene import AreaLight, Material, Mesh, PointLight, Spheres, SpotLight, SunLight, Visibility, World
+from vlp_bpt import Renderer, Scene, materials
+from vlp_bpt.scene import (
+    AreaLight,
+    Lobe,
+    LobeKind,
+    Material,
+    Mesh,
+    PointLight,
+    Spheres,
+    SpotLight,
+    SunLight,
+    Visibility,
+    World,
+)
 
 HITS_ONLY: dict[str, Any] = {"light_samples": 0, "vlp_connections": 0, "splats": False}
 DIRECT: dict[str, Any] = {"light_path_length": 0, "vlp_connections": 0, "eye_path_length": 2}
@@ -112,6 +124,32 @@ def test_windows_lose_exactly_the_longer_paths(L: int, K: int, C: int, S: int, s
     )  # fmt: skip
     pictures = blocks(batches(lit_inside(), options, 12), 8)
     assert_mean(pictures, expected, f"L {L}, K {K}, C {C}, S {S}, splats {splats}", rounding=1e-4)
+
+
+@pytest.mark.parametrize("splats", [False, True])
+@pytest.mark.parametrize(("L", "K", "C"), [(0, 1, 1), (0, 4, 1), (3, 2, 1), (5, 1, 0), (2, 5, 2), (64, 64, 1)])
+def test_lost_light_is_that_of_the_longer_paths(L: int, K: int, C: int, splats: bool) -> None:
+    """Of a geometric series; the pilot itself follows 64 reflections. Within four of its standard errors."""
+    longest = max(K + 1 + (L + 1 if L > 0 and C > 0 else 1), L + 2 if splats and L > 0 else 0)
+    lost = 1 - geometric(0.7, longest - 2) / geometric(0.7, 64)
+    options = settings(light_path_length=L, eye_path_length=K, vlp_connections=C, light_paths=200, splats=splats)
+    share, error = Renderer(lit_inside(), options).lost_light()
+    assert error < 0.02
+    assert share == pytest.approx(max(lost, 0), abs=4 * error + 1e-6)
+
+
+def test_lost_light_knows_mirrors() -> None:
+    """The camera sees a ground in a mirror alone, which joins neither light samples nor virtual light points: an eye
+    path of one hit finds nothing, whatever the light paths are."""
+    mirror = Material("mirror", (Lobe(LobeKind.REFLECTION, (1, 1, 1)),))
+    builder = Builder(16, looking((0, 0, 1), (0, 0, 3), 0.2, up=(0, 1, 0)))
+    builder.add(square(2, (0, 0, 3)), mirror).add(square(8, (0, 0, 0)), grey(0.5))
+    builder.scene.lights = [PointLight("lamp", (2, 0, 1), (10, 10, 10))]
+    lengths = {K: settings(eye_path_length=K, light_path_length=5) for K in (1, 2, 8)}
+    shares = {K: Renderer(builder.scene, options).lost_light() for K, options in lengths.items()}
+    assert shares[1][0] == 1
+    assert shares[2][0] < 0.5
+    assert shares[8][0] < 0.001
 
 
 @pytest.mark.parametrize("splats", [False, True])

@@ -225,6 +225,18 @@ def test_interrupting_before_the_first_picture_leaves_none(folder: Path) -> None
     assert not (folder / "a.exr").exists()
 
 
+def test_missing_light_is_told(folder: Path) -> None:
+    short = ("--set", "eye_path_length=1", "--set", "light_path_length=0")
+    said = vlp_bpt(folder, "render", "room.vlp.npz", "-o", "short.png", "--samples", "2", *short).stdout
+    assert re.search(r", \d+\.\d % of the light missing \(it takes longer paths", said)
+    assert (
+        "missing"
+        not in vlp_bpt(
+            folder, "render", "room.vlp.npz", "-o", "long.png", "--samples", "2", "--set", "mode=REFERENCE"
+        ).stdout
+    )
+
+
 def test_progress_on_a_terminal_and_without_one(folder: Path) -> None:
     arguments = ("render", "room.vlp.npz", "-o", "a.exr", "--samples", "100000", "--time", "1.5")
     terminal = OnTerminal(folder, *arguments)
