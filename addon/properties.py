@@ -67,8 +67,8 @@ def apply_mode(self: Any, context: Any) -> None:
 
 
 _DEFAULTS = {
-    "light_path_length": 3,
-    "eye_path_length": 8,
+    "light_path_length": 6,
+    "eye_path_length": 6,
     "vlp_connections": 1,
     "vlp_candidates": 1,
     "light_samples": 1,
@@ -125,7 +125,7 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
     light_paths: bpy.props.IntProperty(
         name="Light Paths",
         description="How many paths start at the lamps in each sample (the paper's N). More give finer indirect light "
-        "and caustics, and take memory. Zero: as many as the picture has pixels",
+        "and caustics, and take memory. Zero: one for every four pixels, or for every pixel in Paper mode",
         default=0,
         min=0,
         max=2**26,

@@ -52,7 +52,8 @@ class Device(StrEnum):
 class ModePreset:
     """What a mode gives to the settings that are left at None, and the room that automatic `light_paths` may take.
 
-    light_vertices bounds N * L when N is chosen from the picture's size: a stored light vertex takes 64 bytes.
+    Automatic N is one light path for so many pixels, and at most light_vertices / L: a stored light vertex takes 64
+    bytes. How the figures were chosen: native/integrator/README.md.
     """
 
     light_path_length: int
@@ -62,13 +63,14 @@ class ModePreset:
     light_samples: int
     splats: bool
     weighting: Weighting
+    pixels_per_light_path: int
     light_vertices: int
 
 
 MODE_PRESETS: dict[Mode, ModePreset] = {
-    Mode.PAPER: ModePreset(1, 5, 1, 1, 1, False, Weighting.UNIFORM, light_vertices=1 << 23),
-    Mode.BALANCED: ModePreset(3, 8, 1, 1, 1, True, Weighting.BALANCE, light_vertices=1 << 23),
-    Mode.REFERENCE: ModePreset(64, 64, 1, 1, 1, True, Weighting.BALANCE, light_vertices=1 << 21),
+    Mode.PAPER: ModePreset(1, 5, 1, 1, 1, False, Weighting.UNIFORM, 1, light_vertices=1 << 23),
+    Mode.BALANCED: ModePreset(6, 6, 1, 1, 1, True, Weighting.BALANCE, 4, light_vertices=1 << 23),
+    Mode.REFERENCE: ModePreset(64, 64, 1, 1, 1, True, Weighting.BALANCE, 4, light_vertices=1 << 21),
 }
 
 # The least and the most that a number may be, both allowed.
@@ -164,7 +166,7 @@ class RenderSettings:
                 values[name] = getattr(preset, name, 0)
         if values["light_paths"] == 0:
             most = preset.light_vertices // max(values["light_path_length"], 1)
-            values["light_paths"] = max(min(width * height, most), 1)
+            values["light_paths"] = max(min(width * height // preset.pixels_per_light_path, most), 1)
         return ResolvedSettings(**values)
 
     def to_dict(self) -> dict[str, Any]:

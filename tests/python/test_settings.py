@@ -15,9 +15,9 @@ from vlp_bpt.settings import FROM_MODE, MODE_PRESETS, Device
 @pytest.mark.parametrize(
     ("mode", "expected"),
     [
-        (Mode.PAPER, (1, 5, 1, 1, False, Weighting.UNIFORM)),
-        (Mode.BALANCED, (3, 8, 1, 1, True, Weighting.BALANCE)),
-        (Mode.REFERENCE, (64, 64, 1, 1, True, Weighting.BALANCE)),
+        (Mode.PAPER, (1, 5, 1, 1, 1, False, Weighting.UNIFORM, 5000)),
+        (Mode.BALANCED, (6, 6, 1, 1, 1, True, Weighting.BALANCE, 1250)),
+        (Mode.REFERENCE, (64, 64, 1, 1, 1, True, Weighting.BALANCE, 1250)),
     ],
 )
 def test_a_mode_fills_what_is_open(mode: Mode, expected: tuple[Any, ...]) -> None:
@@ -26,13 +26,14 @@ def test_a_mode_fills_what_is_open(mode: Mode, expected: tuple[Any, ...]) -> Non
         settings.light_path_length,
         settings.eye_path_length,
         settings.vlp_connections,
+        settings.vlp_candidates,
         settings.light_samples,
         settings.splats,
         settings.weighting,
+        settings.light_paths,
     )
     assert found == expected
     assert settings.hits
-    assert settings.light_paths == 5000
 
 
 @pytest.mark.parametrize("mode", list(Mode))
@@ -56,8 +57,8 @@ def test_what_is_set_stays(mode: Mode) -> None:
 @pytest.mark.parametrize("size", [(1, 1), (512, 512), (1920, 1080), (8192, 8192)])
 def test_automatic_light_paths_fit_their_room(mode: Mode, size: tuple[int, int]) -> None:
     settings = RenderSettings(mode=mode).resolved(*size)
-    pixels, room = size[0] * size[1], MODE_PRESETS[mode].light_vertices
-    assert settings.light_paths == min(pixels, room // settings.light_path_length)
+    wanted, room = size[0] * size[1] // MODE_PRESETS[mode].pixels_per_light_path, MODE_PRESETS[mode].light_vertices
+    assert settings.light_paths == max(min(wanted, room // settings.light_path_length), 1)
     assert RenderSettings(mode=mode, light_paths=0).resolved(*size) == settings
 
 
@@ -67,7 +68,9 @@ def test_reference_traces_at_most_32768_light_paths() -> None:
 
 @pytest.mark.parametrize("mode", list(Mode))
 def test_automatic_light_paths_without_light_path_length(mode: Mode) -> None:
-    assert RenderSettings(mode=mode, light_path_length=0).resolved(8, 8).light_paths == 64
+    assert RenderSettings(mode=mode, light_path_length=0).resolved(8, 8).light_paths == (
+        64 if mode is Mode.PAPER else 16
+    )
 
 
 @pytest.mark.parametrize(
