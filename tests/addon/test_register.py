@@ -128,7 +128,7 @@ def test_panels_of_blender_that_fit_are_shown() -> None:
 
 def test_panels_of_this_addon_are_for_this_engine_alone() -> None:
     own = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("VLP_BPT_PT")]
-    assert len(own) == 8
+    assert len(own) == 9
     assert all({"VLP_BPT"} == panel.COMPAT_ENGINES for panel in own)
 
 
