@@ -57,8 +57,8 @@ class Case:
 CASES = [
     Case("cornell_box", iterations=64, cycles=64, mitsuba=128),
     Case("caustics", iterations=256, cycles=256, mitsuba=256, joined=2, regions=2),
-    Case("indirect_room", iterations=256, cycles=256, mitsuba=256),
-    Case("sierpinski", iterations=512, cycles=160, mitsuba=512, joined=2, facets=True),
+    Case("indirect_room", iterations=256, cycles=640, mitsuba=512, regions=2),
+    Case("sierpinski", iterations=512, cycles=320, mitsuba=512, joined=4, facets=True),
     Case("bumpy_furnace", iterations=32, cycles=32, mitsuba=32, other=("mitsuba", SHADING_HORIZON)),
     Case("mis_plates", iterations=256, cycles=128, mitsuba=256),
     Case("thousand_lights", iterations=128, cycles=64, mitsuba=128),
