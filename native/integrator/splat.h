@@ -40,7 +40,7 @@ VLP_HD inline void connect_to_lens(const SceneView& scene, const PassSettings& p
     const uint32_t s = y.index() + 1;
     Splat splat{{.s = s, .t = 1, .vlp = &y}, seen.film};
     splat.found.value = y.throughput * at_y.f * through * (eye_pdf / static_cast<float>(pass.light_paths));
-    StrategySum sum = strategy_sum(pass, s, 1);
+    StrategySum sum = strategy_sum(pass, splat_count(pass));
     add_shorter_light_walks(sum, pass, &y, s, s + 1, eye_pdf / y.pdf_area, at_y.pdf_light * y.rev_geometry);
     splat.found.weight = sum.weight();
     sink.add(splat);
