@@ -19,9 +19,6 @@ float pilot_vlps_per_path(const SceneView& scene, const PassSettings& pass) {
     return static_cast<float>(stored) / static_cast<float>(k_pilot_paths);
 }
 
-namespace {
-
-// The settings with what the scene makes of them: kappa, and splats only where there are light paths.
 PassSettings for_scene(const SceneView& scene, PassSettings pass) {
     const bool light_walks = pass.light_path_length > 0 && pass.light_paths > 0 && scene.light_count > 0;
     pass.splats &= light_walks;
@@ -32,6 +29,8 @@ PassSettings for_scene(const SceneView& scene, PassSettings pass) {
     }
     return pass;
 }
+
+namespace {
 
 std::unique_ptr<Backend> make_backend(const std::string& device, const Scene& scene, const PassSettings& pass,
                                       unsigned threads) {
