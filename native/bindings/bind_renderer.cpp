@@ -9,6 +9,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "renderer/renderer.h"
+#include "renderer/strategies.h"
 #include "renderer/truncation.h"
 #include "scene/scene.h"
 
@@ -16,6 +17,7 @@ namespace vlp {
 namespace {
 
 using Picture = nb::ndarray<float, nb::shape<-1, -1, 4>, nb::c_contig, nb::device::cpu>;
+using RgbPicture = nb::ndarray<float, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
 using FilmState = nb::ndarray<const int64_t, nb::shape<-1, -1, 4, 2>, nb::c_contig, nb::device::cpu>;
 
 template <typename T>
@@ -94,6 +96,11 @@ void add_film_state(Renderer& renderer, FilmState state, uint64_t iterations) {
     renderer.film().add({reinterpret_cast<const ExactSum*>(state.data()), state.size() / 2}, iterations);
 }
 
+PassSettings pass_of(const std::shared_ptr<Scene>& scene, const nb::dict& settings) {
+    if (!scene || !scene->built()) throw std::runtime_error("scene: build() has not been called");
+    return pass_of(settings, scene->transparent_film());
+}
+
 // In one iteration.
 uint32_t traced_light_paths(const Renderer& renderer) {
     return renderer.pass().traces_light() ? renderer.pass().light_paths : 0;
@@ -131,8 +138,7 @@ void bind_renderer(nb::module_& m) {
     nb::class_<Renderer>(m, "Renderer")
         .def("__init__",
              [](Renderer* self, std::shared_ptr<Scene> scene, const nb::dict& settings) {
-                 if (!scene || !scene->built()) throw std::runtime_error("scene: build() has not been called");
-                 const PassSettings pass = pass_of(settings, scene->transparent_film());
+                 const PassSettings pass = pass_of(scene, settings);
                  const auto device = get<std::string>(settings, "device");
                  const auto threads = get<uint32_t>(settings, "threads"),
                             first = get<uint32_t>(settings, "iteration_begin");
@@ -172,6 +178,21 @@ void bind_renderer(nb::module_& m) {
                          return r.film().iterations() * (r.film().window().pixel_count() + traced_light_paths(r));
                      })
         .def_prop_ro("kappa", [](const Renderer& r) { return r.pass().kappa; });
+    nb::class_<StrategyRenderer>(m, "StrategyRenderer")
+        .def("__init__",
+             [](StrategyRenderer* self, std::shared_ptr<Scene> scene, const nb::dict& settings) {
+                 const PassSettings pass = pass_of(scene, settings);
+                 const auto threads = get<uint32_t>(settings, "threads");
+                 nb::gil_scoped_release release;
+                 new (self) StrategyRenderer(scene, pass, threads);
+             })
+        .def("iterate", &StrategyRenderer::iterate, nb::arg("iteration"), nb::call_guard<nb::gil_scoped_release>())
+        .def(
+            "read",
+            [](const StrategyRenderer& r, uint32_t s, uint32_t t, bool weighted, RgbPicture out) {
+                r.read(s, t, weighted, {out.data(), out.size()});
+            },
+            nb::arg("s"), nb::arg("t"), nb::arg("weighted"), nb::arg("out").noconvert());
     m.def("devices", &devices);
 }
 

@@ -25,8 +25,8 @@ VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings&
     const float eye_pdf =
         is_infinite(light) ? pdf_solid_angle : pdf_solid_angle * abs_dot(normal, direction) / dist_squared;
     const LightEnd end = light_end(scene, light_index, x_1, position, normal, direction, dist_squared);
-    StrategySum sum = strategy_sum(pass, 0, t);
-    if (!eye.last().specular) sum.add(end.pdf_next_event / eye_pdf, strategy_count(pass, 1, t - 1));
+    StrategySum sum = strategy_sum(pass, strategy_count(pass, 0));
+    if (!eye.last().specular) sum.add(end.pdf_next_event / eye_pdf, strategy_count(pass, 1));
     const float cos_x_1 = abs_dot(x_1.geometric_normal, direction);
     const float ratio = end.pdf_emission / eye_pdf * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
     add_longer_light_walks(sum, pass, eye.vertices, t, 2, ratio, eye.last().rev_ratio);

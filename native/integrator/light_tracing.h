@@ -9,7 +9,7 @@ namespace vlp {
 
 // Traces light path `path` of an iteration into slots[0 ... L - 1], y_1 first; slots past its end are marked not valid.
 // Returns how many of them can be connected; each of these is joined to the lens too, for sink.add(Splat), as far as
-// sink.wanted() and sink.reaches(film). `stream` keeps the pilot's paths apart from the render's.
+// sink.wanted(i) and sink.reaches(film). `stream` keeps the pilot's paths apart from the render's.
 template <typename Sink>
 VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettings& pass, Stream stream,
                                         uint32_t iteration, uint32_t path, LightVertex* slots, Sink& sink) {
@@ -80,7 +80,7 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
         if (material.has_finite) {  // Listing 2: save a VLP
             vertex.packed |= LightVertex::k_connectible;
             ++connectible;
-            if (sink.wanted()) {
+            if (sink.wanted(i)) {
                 lens_sampler.dimension = i;
                 connect_to_lens(scene, pass, vertex, y, -ray.direction, lens_sampler.next_2d(), sink);
             }

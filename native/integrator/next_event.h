@@ -35,9 +35,9 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
 
     const uint32_t n = eye.t + 1;
     const float dist_squared = event.distance * event.distance;
-    StrategySum sum = strategy_sum(pass, 1, eye.t);
+    StrategySum sum = strategy_sum(pass, strategy_count(pass, 1));
     if (!event.delta && n <= pass.eye_path_length + 1) {
-        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0, n));
+        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0));
     }
     if (pass.light_path_length > 0 && (eye.t > 2 || pass.splats)) {
         const LightEnd end =

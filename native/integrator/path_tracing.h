@@ -20,9 +20,8 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
 
     EyeWalk eye;
     float pdf_solid_angle = 1;  // of the direction that the walk took last
-    const Vec3 lens = ray.origin - ray.direction * distance_from_lens(scene.camera, ray);
     PrimitiveId skip{};
-    Anchor from{};
+    Anchor from{ray.origin - ray.direction * distance_from_lens(scene.camera, ray), {}, {}};
     const bool has_vlps = pass.kappa > 0 && cache.stored_count > 0 && pass.vlp_connections > 0;
     // Every step draws from dimensions of its own, so that a path's later draws do not shift with its earlier ones.
     const uint32_t draws_per_step = 4 + 2 * pass.light_samples + 2 * pass.vlp_connections;
@@ -42,9 +41,11 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         // z becomes the walk's last vertex.
         const SurfacePoint& z = step.surface;
         const VertexDensity& previous = eye.last();
-        const float dist_squared = length_squared(z.position - (from_camera ? lens : from.position));
-        const float per_area = from_camera ? pixels_per_area(scene.camera, ray.direction, std::sqrt(dist_squared))
-                                           : pdf_solid_angle / dist_squared;
+        const float dist_squared = length_squared(z.position - from.position);
+        // Splats alone are weighed against the density of z_1.
+        const float per_area = from_camera && pass.splats
+                                   ? pixels_per_area(scene.camera, ray.direction, std::sqrt(dist_squared))
+                                   : pdf_solid_angle / dist_squared;
         VertexDensity& vertex = eye.vertices[eye.t];
         vertex.pdf_area = per_area * abs_dot(z.geometric_normal, ray.direction);
         vertex.rev_geometry =

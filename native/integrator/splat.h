@@ -40,7 +40,7 @@ VLP_HD inline void connect_to_lens(const SceneView& scene, const PassSettings& p
     const uint32_t s = y.index() + 1;
     Splat splat{{.s = s, .t = 1, .vlp = &y}, seen.film};
     splat.found.value = y.throughput * at_y.f * through * (eye_pdf / static_cast<float>(pass.light_paths));
-    StrategySum sum = strategy_sum(pass, s, 1);
+    StrategySum sum = strategy_sum(pass, splat_count(pass, s));
     add_shorter_light_walks(sum, pass, &y, s, s + 1, eye_pdf / y.pdf_area, at_y.pdf_light * y.rev_geometry);
     splat.found.weight = sum.weight();
     sink.add(splat);
@@ -48,7 +48,7 @@ VLP_HD inline void connect_to_lens(const SceneView& scene, const PassSettings& p
 
 // Light paths that are not joined to the lens.
 struct NoSplats {
-    VLP_HD bool wanted() const { return false; }
+    VLP_HD bool wanted(uint32_t) const { return false; }
     VLP_HD bool reaches(Vec2) const { return false; }
     VLP_HD void add(const Splat&) {}
 };
@@ -83,7 +83,8 @@ struct SplatSink {
     FetchAdd fetch_add;  // see add_shared
     uint32_t dropped = 0;
 
-    VLP_HD bool wanted() const { return pass.splats; }
+    // Whether y_i is to be joined to the lens.
+    VLP_HD bool wanted(uint32_t i) const { return splats_from(pass, i); }
     VLP_HD bool reaches(Vec2 film) const {
         const float radius = filter_radius(pass.filter, pass.filter_width);
         const Vec2 low{static_cast<float>(window.x), static_cast<float>(window.y)};

@@ -46,7 +46,7 @@ VLP_HD inline float connection_weight(const PassSettings& pass, const EyeWalk& e
                                       const LightVertex* vlp, const LobeValue& at_vlp, const Edge& edge, float cos_eye,
                                       float cos_vlp) {
     const uint32_t s = vlp->index() + 1, n = s + eye.t;
-    StrategySum sum = strategy_sum(pass, s, eye.t);
+    StrategySum sum = strategy_sum(pass, strategy_count(pass, s));
     const float light_pdf = at_vlp.pdf_eye * cos_eye / edge.dist_squared;
     add_longer_light_walks(sum, pass, eye.vertices, n, s + 1, light_pdf / eye.last().pdf_area,
                            at_eye.pdf_eye * eye.last().rev_geometry);

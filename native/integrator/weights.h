@@ -18,12 +18,22 @@
 
 namespace vlp {
 
-// How often an iteration draws strategy (s, t) for a pixel: hits once, S light samples, kappa draws of a virtual light
-// point, and N light paths of which each may splat on it. 0: it is switched off.
-VLP_HD inline float strategy_count(const PassSettings& pass, uint32_t s, uint32_t t) {
-    if (t == 1) return pass.splats ? static_cast<float>(pass.light_paths) : 0.0f;
+// How often an iteration draws a strategy for a pixel: hits once, S light samples, kappa draws of a virtual light point.
+// 0: it is switched off. Those with t = 1 are counted by splat_count.
+VLP_HD inline float strategy_count(const PassSettings& pass, uint32_t s) {
     if (s == 0) return pass.hits ? 1.0f : 0.0f;
     return s == 1 ? static_cast<float>(pass.light_samples) : pass.kappa;
+}
+
+// Whether the vertices y_i of light paths splat. Those of direct light, i = 1, do so only where there is no next event,
+// which finds the same light with less noise: one sample for each pixel, where splats crowd at random.
+VLP_HD inline bool splats_from(const PassSettings& pass, uint32_t i) {
+    return pass.splats && (i > 1 || pass.light_samples == 0);
+}
+
+// Strategies (s, 1): each of N light paths may splat on the pixel.
+VLP_HD inline float splat_count(const PassSettings& pass, uint32_t s) {
+    return splats_from(pass, s - 1) ? static_cast<float>(pass.light_paths) : 0.0f;
 }
 
 // Sums what the other strategies have relative to the one at hand.
@@ -50,8 +60,8 @@ struct StrategySum {
     VLP_HD float weight() const { return 1.0f / sum; }
 };
 
-VLP_HD inline StrategySum strategy_sum(const PassSettings& pass, uint32_t s, uint32_t t) {
-    return {pass.weighting, strategy_count(pass, s, t)};
+VLP_HD inline StrategySum strategy_sum(const PassSettings& pass, float own_count) {
+    return {pass.weighting, own_count};
 }
 
 // Adds strategies k_first, k_first + 1, ...: eye vertices become light vertices, from the light's end of the eye walk on.
@@ -62,7 +72,8 @@ VLP_HD inline void add_longer_light_walks(StrategySum& sum, const PassSettings& 
     const uint32_t t_least = pass.splats ? 1 : 2;
     for (uint32_t k = k_first; k <= pass.light_path_length + 1 && k + t_least <= n && ratio > 0; ++k) {
         const VertexDensity &end = eye[n - 1 - k], &freed = eye[n - k];  // x_k and x_{k-1}
-        if (!end.specular && !freed.specular) sum.add(ratio, strategy_count(pass, k, n - k));
+        if (!end.specular && !freed.specular)
+            sum.add(ratio, k + 1 < n ? strategy_count(pass, k) : splat_count(pass, k));
         ratio *= k == k_first ? next_ratio : freed.rev_ratio;
     }
 }
@@ -74,14 +85,14 @@ VLP_HD inline void add_shorter_light_walks(StrategySum& sum, const PassSettings&
     const LightVertex* freed = vlp;  // x_k = y_k, free of the light walk from strategy k on
     for (uint32_t k = s - 1; n - k <= pass.eye_path_length + 1 && ratio > 0; --k, --freed) {
         if (k == 0) {  // y_0 has no slot: `freed` must not be looked at
-            sum.add(ratio, strategy_count(pass, 0, n));
+            sum.add(ratio, strategy_count(pass, 0));
             return;
         }
         const bool finite = freed == vlp || !freed->specular();
         if (k == 1) {
-            if (finite) sum.add(ratio * freed->next_event_ratio, strategy_count(pass, 1, n - 1));
+            if (finite) sum.add(ratio * freed->next_event_ratio, strategy_count(pass, 1));
         } else if (finite && !freed[-1].specular()) {
-            sum.add(ratio, strategy_count(pass, k, n - k));
+            sum.add(ratio, strategy_count(pass, k));
         }
         ratio *= freed == vlp ? next_ratio : freed->rev_ratio;
     }

@@ -161,6 +161,7 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
         if (k == 0 && is_delta(light)) continue;  // no ray hits it
         if (n == 2 && k > 0) continue;  // hits alone show lights directly
         if ((k == 0 && !pass.hits) || (k == n - 1 && !pass.splats)) continue;
+        if (k == 2 && n == 3 && pass.light_samples > 0) continue;  // direct light is left to next event
         if (k == 1 && x_1.specular) continue;
         if (k >= 2 && (path.x[k - 1].specular || path.x[k].specular)) continue;
         double density = k == 0 ? 1.0 : k == 1 ? double(pass.light_samples) : double{pass.kappa};

@@ -19,19 +19,19 @@ float pilot_vlps_per_path(const SceneView& scene, const PassSettings& pass) {
     return static_cast<float>(stored) / static_cast<float>(k_pilot_paths);
 }
 
-namespace {
-
-// The settings with what the scene makes of them: kappa, and splats only where there are light paths.
 PassSettings for_scene(const SceneView& scene, PassSettings pass) {
     const bool light_walks = pass.light_path_length > 0 && pass.light_paths > 0 && scene.light_count > 0;
     pass.splats &= light_walks;
     pass.kappa = 0;
     if (pass.vlp_connections > 0 && light_walks) {
         const float vlps_per_path = pilot_vlps_per_path(scene, pass);
-        if (vlps_per_path > 0) pass.kappa = static_cast<float>(pass.vlp_connections * pass.vlp_candidates) / vlps_per_path;
+        if (vlps_per_path > 0)
+            pass.kappa = static_cast<float>(pass.vlp_connections * pass.vlp_candidates) / vlps_per_path;
     }
     return pass;
 }
+
+namespace {
 
 std::unique_ptr<Backend> make_backend(const std::string& device, const Scene& scene, const PassSettings& pass,
                                       unsigned threads) {

@@ -43,6 +43,9 @@ private:
     std::chrono::steady_clock::time_point deadline_ = std::chrono::steady_clock::time_point::max();
 };
 
+// The settings with what the scene makes of them: kappa, from a pilot light pass, and splats only where there are light paths.
+PassSettings for_scene(const SceneView& scene, PassSettings pass);
+
 // How many VLPs a light path stores on average, by paths of a stream of their own: the same on every machine.
 float pilot_vlps_per_path(const SceneView& scene, const PassSettings& pass);
 

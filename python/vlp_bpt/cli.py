@@ -21,6 +21,7 @@ from .render import Renderer, devices, load_native, native_errors
 from .scene import Mesh, Scene
 from .settings import FROM_MODE, Device, RenderSettings
 from .snapshot import SUFFIX, Snapshot, load_snapshot, save_snapshot, scene_digest
+from .strategies import SHEET, make_folder, render_strategies, write_strategies
 from .upload import upload
 
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
@@ -134,12 +135,19 @@ vlp-bpt render room.blend -o room.exr --samples 500 --frame 12
 vlp-bpt render room.vlp.npz -o room.exr --time 60
 vlp-bpt render room.vlp.npz -o paper.exr --set mode=PAPER --set eye_path_length=5
 vlp-bpt render room.vlp.npz -o part.exr --iterations 500:1000   (then: vlp-bpt merge)
+vlp-bpt render room.vlp.npz --debug-strategies room --samples 64 --set light_path_length=2
+
+--debug-strategies keeps apart what each way of making a path finds. (s, t): s vertices were made from the light, t from
+the camera; s0 ran into a light, s1 sampled one, t1 splat on the film, the others joined a virtual light point. Raw
+pictures of the same n = s + t vertices show the same light, so they must agree in brightness, and show which way is
+noisy where; dark ones cannot make these paths (mirrors, point lights). Weighted ones are the shares that add up to the
+picture: noise that is left in one of them is noise of the picture, and light in two of them at full strength is a bug.
 """
 
 
 def _add_render(render: argparse.ArgumentParser) -> None:
     render.add_argument("file", type=Path, metavar=f"FILE.blend|FILE{SUFFIX}")
-    _add_output(render)
+    _add_output(render, required=False)
     render.add_argument("--frame", type=int, help="frame of a .blend (default: its current one)")
     render.add_argument("--samples", metavar="N", help="iterations to render")
     render.add_argument("--time", metavar="SECONDS", help="stop after this long, samples or not")
@@ -157,11 +165,21 @@ def _add_render(render: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help=f"any setting: {', '.join(RenderSettings().to_dict())}",
     )
+    render.add_argument(
+        "--debug-strategies",
+        type=Path,
+        metavar="DIR",
+        help="instead of a picture, write what each strategy (s, t) finds into DIR: s2_t3_raw.exr, s2_t3_weighted.exr, "
+        f"... and {SHEET}, which shows all of them, raw ones left, weighted ones right, with a row for each number of "
+        "vertices from 2 on and a column for each s from 0 on",
+    )
     render.add_argument("--quiet", action="store_true", help="no progress")
 
 
-def _add_output(command: argparse.ArgumentParser) -> None:
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.exr|png", help="the picture to write")
+def _add_output(command: argparse.ArgumentParser, *, required: bool = True) -> None:
+    command.add_argument(
+        "-o", "--output", type=Path, required=required, metavar="OUT.exr|png", help="the picture to write"
+    )
     command.add_argument(
         "--depth",
         type=Depth,
@@ -176,6 +194,10 @@ def _add_output(command: argparse.ArgumentParser) -> None:
 
 def _render(options: argparse.Namespace) -> int:
     kind = _scene_kind(options.file)
+    if options.debug_strategies is not None:
+        return _render_strategies(options, kind)
+    if options.output is None:
+        raise UsageError("the following arguments are required: -o/--output")
     check_output(options.output, options.depth)
     values = _setting_values(options)
     iterations = _iterations(options)
@@ -183,18 +205,9 @@ def _render(options: argparse.Namespace) -> int:
         values["samples"] = iterations[1] - iterations[0]
     if kind == "blend" and iterations is None:
         return _render_blend(options, values)
-    if kind == "blend":
-        snapshot, warnings = _capture(options.file, options.frame, values)
-    else:
-        if options.frame is not None:
-            raise UsageError("--frame is for .blend files: a snapshot holds one frame")
-        snapshot, warnings = load_snapshot(options.file), []
-    settings = (snapshot.settings or RenderSettings()).to_dict()
-    renderer = Renderer(
-        snapshot.scene,
-        RenderSettings.from_dict(_with_mode_first(settings, values)),
-        first_iteration=iterations[0] if iterations is not None else 0,
-    )
+    snapshot, warnings, settings = _scene_to_render(options, kind, values)
+    first = iterations[0] if iterations is not None else 0
+    renderer = Renderer(snapshot.scene, settings, first_iteration=first)
     _warn(warnings + renderer.warnings)
     with ProgressDisplay(quiet=options.quiet) as display:
         image = renderer.render(lambda progress: display.show(renderer, progress))
@@ -204,6 +217,38 @@ def _render(options: argparse.Namespace) -> int:
         image.film_state = renderer.film_state()
     write_image(options.output, image, options.depth)
     return _finish(options.output, renderer)
+
+
+def _scene_to_render(
+    options: argparse.Namespace, kind: str, values: dict[str, Any]
+) -> tuple[Snapshot, list[str], RenderSettings]:
+    """The scene of the file, warnings about it, and its settings with `values` over them."""
+    if kind == "blend":
+        snapshot, warnings = _capture(options.file, options.frame, values)
+    else:
+        if options.frame is not None:
+            raise UsageError("--frame is for .blend files: a snapshot holds one frame")
+        snapshot, warnings = load_snapshot(options.file), []
+    settings = (snapshot.settings or RenderSettings()).to_dict()
+    return snapshot, warnings, RenderSettings.from_dict(_with_mode_first(settings, values))
+
+
+def _render_strategies(options: argparse.Namespace, kind: str) -> int:
+    for name in ("output", "iterations", "time"):
+        if getattr(options, name) is not None:
+            raise UsageError(f"--debug-strategies writes pictures of its own: leave --{name} out")
+    make_folder(options.debug_strategies)
+    snapshot, warnings, settings = _scene_to_render(options, kind, _setting_values(options))
+    _warn(warnings + snapshot.scene.validate())
+
+    def report(done: int) -> None:
+        if not options.quiet and sys.stderr.isatty():
+            print(f"\r{done} of {settings.samples} samples", end="", file=sys.stderr, flush=True)
+
+    pictures = render_strategies(snapshot.scene, settings, report)
+    written = write_strategies(options.debug_strategies, pictures)
+    print(f"{options.debug_strategies}: {len(written) - 1} pictures and {SHEET}, {pictures.iterations} samples")
+    return 0
 
 
 def _render_blend(options: argparse.Namespace, values: dict[str, Any]) -> int:

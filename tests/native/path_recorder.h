@@ -21,7 +21,7 @@ struct SplatRecorder {
     };
     std::vector<Found> found{};
 
-    bool wanted() const { return pass.splats; }
+    bool wanted(uint32_t i) const { return splats_from(pass, i); }
     bool reaches(Vec2) const { return true; }
     void add(const Splat& splat) {
         float on_film = 0;

@@ -132,12 +132,14 @@ TEST_P(StrategiesTest, FindTheSameLight) {
     pass.light_path_length = 3, pass.eye_path_length = 5;
     pass.light_paths = 1500, pass.vlp_connections = 6, pass.light_samples = 2, pass.splats = true;
     pass = with_kappa(scene.view(), pass);
+    PassSettings light_pass = pass;
+    light_pass.light_samples = 0;  // so that direct light is splat too
 
     std::vector<Tally> batches(k_batches);
     for (uint32_t b = 0; b < k_batches; ++b) {
-        pass.seed = b;  // batches are independent, iterations of one seed are stratified
+        pass.seed = light_pass.seed = b;  // batches are independent, iterations of one seed are stratified
         for (uint32_t iteration = 0; iteration < k_iterations; ++iteration) {
-            const TracedLight light(scene.view(), pass, iteration);
+            const TracedLight light(scene.view(), light_pass, iteration);
             for (const SplatRecorder::Found& found : light.splats) batches[b].add(found);
             for (uint32_t i = 0; i < k_pixels * k_pixels; ++i) {
                 trace_eye_path(scene.view(), pass, light.cache, iteration, i % k_pixels, i / k_pixels, batches[b]);

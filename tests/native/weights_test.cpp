@@ -19,7 +19,7 @@ struct Counts {
 };
 constexpr Counts k_counts[] = {{0, 4, 300, 1, 1, false}, {1, 1, 300, 1, 2},  {1, 5, 500, 2, 1, false},
                                {3, 4, 1500, 3, 4},       {6, 2, 3000, 1, 3}, {5, 5, 1500, 2, 1},
-                               {3, 3, 1500, 0, 1},       {2, 4, 300, 1, 0},  {2, 4, 300, 2, 1, true, false}};
+                               {3, 3, 1500, 0, 1},       {2, 4, 1500, 1, 0}, {2, 4, 300, 2, 1, true, false}};
 
 // Whether rounding leaves the path's densities be: edges are long beside the offsets of ray origins, and no surface is met
 // at so flat an angle that the rounded directions and normals of a light vertex change its cosine much.

@@ -72,6 +72,18 @@ def test_settings_of_the_command_line_come_last(folder: Path) -> None:
     assert found == {"samples": 2, "seed": 5, "device": "CPU", "filter": "BOX", "mode": "PAPER"}
 
 
+def test_debug_strategies_writes_a_picture_of_each(folder: Path) -> None:
+    """PAPER with K = 2: hits and light samples of 2 eye vertices or 3, VLPs likewise; no splats."""
+    result = vlp_bpt(folder, "render", "room.vlp.npz", "--debug-strategies", "all", "--set", "eye_path_length=2")
+    assert result.stdout == "all: 12 pictures and strategies.png, 6 samples\n"
+    assert result.stderr == ""
+    names = {f"s{s}_t{t}_{kind}.exr" for s in (0, 1, 2) for t in (2, 3) for kind in ("raw", "weighted")}
+    assert {path.name for path in (folder / "all").iterdir()} == names | {"strategies.png"}
+    vlp_bpt(folder, "render", "room.vlp.npz", "-o", "a.exr", "--set", "eye_path_length=2")
+    shares = [read_image(folder / "all" / name).pixels[..., :3] for name in names if "weighted" in name]
+    np.testing.assert_allclose(np.sum(shares, axis=0), read_image(folder / "a.exr").pixels[..., :3], rtol=1e-4)
+
+
 def test_a_new_mode_replaces_what_the_old_one_gave(folder: Path) -> None:
     resolved = RenderSettings.from_dict(RenderSettings(mode=Mode.PAPER, samples=2).resolved(24, 16).to_dict())
     save_snapshot(folder / "resolved.vlp.npz", Snapshot(room(24, 16), resolved))
@@ -153,6 +165,8 @@ RENDER = ("render", "room.vlp.npz", "-o", "a.exr")
         ((), "the following arguments are required: COMMAND"),
         (("paint",), "invalid choice: 'paint'"),
         (("render", "room.vlp.npz"), "the following arguments are required: -o/--output"),
+        (("render", "room.vlp.npz", "-o", "a.exr", "--debug-strategies", "x"), "leave --output out"),
+        (("render", "room.vlp.npz", "--debug-strategies", "grey.exr"), "'grey.exr': File exists"),
         (("render", "none.vlp.npz", "-o", "a.exr"), "'none.vlp.npz': there is no such file"),
         (("render", "none.blend", "-o", "a.exr"), "'none.blend': there is no such file"),
         (("render", "grey.exr", "-o", "a.exr"), "'grey.exr': scenes are .blend or .vlp.npz files"),

@@ -94,6 +94,13 @@ def test_an_exported_scene_renders_the_same_picture(folder: Path) -> None:
     assert np.array_equal(snapshot, read_image(folder / "blender.exr").pixels)
 
 
+def test_strategies_of_a_blend(folder: Path) -> None:
+    more = ("--samples", "2", "--set", "eye_path_length=2", "--set", "light_path_length=1")
+    result = vlp_bpt(folder, "render", "box.blend", "--debug-strategies", "strategies", *more)
+    assert result.stdout.endswith("strategies: 14 pictures and strategies.png, 2 samples\n")
+    assert read_image(folder / "strategies" / "s2_t1_weighted.exr").pixels.shape == (32, 24, 4)
+
+
 def test_a_frame_can_be_chosen(folder: Path) -> None:
     for frame in ("1", "2"):
         vlp_bpt(folder, "export", "box.blend", "-o", f"{frame}.vlp.npz", "--frame", frame)
