@@ -39,11 +39,13 @@ class StrategyPictures:
 
 
 def strategies_of(settings: ResolvedSettings) -> Iterator[Strategy]:
-    """The strategies that are switched on and lie within the path lengths L and K."""
+    """The strategies that are switched on and lie within the path lengths L and K. Light samples leave no direct light
+    to splats, (2, 1)."""
+    least_splat = 3 if settings.light_samples > 0 else 2
     for s in range(settings.light_path_length + 2):
         for t in range(1, settings.eye_path_length + 2):
             on = {0: settings.hits, 1: settings.light_samples > 0}.get(s, settings.vlp_connections > 0)
-            if (settings.splats and s >= 2) if t == 1 else on:
+            if (settings.splats and s >= least_splat) if t == 1 else on:
                 yield s, t
 
 
