@@ -97,8 +97,8 @@ def test_an_exported_scene_renders_the_same_picture(folder: Path) -> None:
 def test_strategies_of_a_blend(folder: Path) -> None:
     more = ("--samples", "2", "--set", "eye_path_length=2", "--set", "light_path_length=1")
     result = vlp_bpt(folder, "render", "box.blend", "--debug-strategies", "strategies", *more)
-    assert result.stdout.endswith("strategies: 14 pictures and strategies.png, 2 samples\n")
-    assert read_image(folder / "strategies" / "s2_t1_weighted.exr").pixels.shape == (32, 24, 4)
+    assert result.stdout.endswith("strategies: 12 pictures and strategies.png, 2 samples\n")
+    assert read_image(folder / "strategies" / "s2_t2_weighted.exr").pixels.shape == (32, 24, 4)
 
 
 def test_a_frame_can_be_chosen(folder: Path) -> None:

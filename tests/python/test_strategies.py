@@ -91,9 +91,9 @@ def test_files(tmp_path: Path) -> None:
     written = write_strategies(tmp_path / "new" / "folder", pictures)
     assert len(written) == 2 * len(pictures.raw) + 1
     assert read_image(tmp_path / "new/folder" / SHEET).pixels.max() > 0.5
-    image = read_image(tmp_path / "new/folder/s2_t1_weighted.exr")
-    np.testing.assert_array_equal(image.pixels[..., :3], pictures.weighted[2, 1])
-    assert image.metadata["strategy"] == [2, 1, "weighted"]
+    image = read_image(tmp_path / "new/folder/s3_t1_weighted.exr")
+    np.testing.assert_array_equal(image.pixels[..., :3], pictures.weighted[3, 1])
+    assert image.metadata["strategy"] == [3, 1, "weighted"]
 
 
 def test_too_much_memory_is_refused() -> None:
