@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -15,13 +14,7 @@ class OnTerminal:
     def __init__(self, folder: Path, *arguments: str) -> None:
         self._terminal, inner = os.openpty()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "vlp_bpt", *arguments],
-            cwd=folder,
-            stdout=subprocess.PIPE,
-            stderr=inner,
-            text=True,
-            # A script that ran these tests in the background would have it ignored.
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+            [sys.executable, "-m", "vlp_bpt", *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=inner, text=True
         )
         os.close(inner)
         self.shown = b""
