@@ -160,14 +160,15 @@ void bind_renderer(nb::module_& m) {
             nb::arg("out").noconvert())
         .def("film_state", &film_state)
         .def("add_film_state", &add_film_state, nb::arg("state").noconvert(), nb::arg("iterations"))
-        .def("lost_light",
-             [](const Renderer& r, uint32_t threads) {
-                 nb::gil_scoped_release release;
-                 ThreadPool pool(threads);
-                 const LostLight lost = measure_lost_light(r.scene().view(), r.pass(), pool);
-                 return std::array<float, 2>{lost.share, lost.standard_error};
-             },
-             nb::arg("threads"))
+        .def(
+            "lost_light",
+            [](const Renderer& r, uint32_t threads) {
+                nb::gil_scoped_release release;
+                ThreadPool pool(threads);
+                const LostLight lost = measure_lost_light(r.scene().view(), r.pass(), pool);
+                return std::array<float, 2>{lost.share, lost.standard_error};
+            },
+            nb::arg("threads"))
         .def("memory", [](const Renderer& r) { return memory_of(r, r.scene()); })
         .def_prop_ro("iterations", [](const Renderer& r) { return r.film().iterations(); })
         .def_prop_ro("vlps", [](const Renderer& r) { return r.counters().stored_vlps.load(); })

@@ -7,7 +7,7 @@
 namespace vlp {
 
 struct LostLight {
-    float share = 0;           // of the light of a path tracer whose paths have up to k_max_walk surface hits
+    float share = 0;  // of the light of a path tracer whose paths have up to k_max_walk surface hits
     float standard_error = 0;  // of `share`
 };
 
