@@ -7,7 +7,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -139,22 +139,24 @@ def bench_scene(path: Path, args: argparse.Namespace) -> list[Row]:
 
 
 def entries(path: Path, scene: Scene, args: argparse.Namespace) -> list[Contestant]:
-    """Who takes part. Cycles gets the eye path length of BALANCED, so that it does the work of the entry without VLPs;
-    point clouds come a second time as meshes, since inside glass its points are not spheres."""
+    """Who takes part. Cycles gets the eye path length of BALANCED, so that it does the work of the entry without VLPs
+    that ends walks by roulette, as Cycles does; point clouds come a second time as meshes, since inside glass its points are not spheres."""
     common: dict[str, Any] = {"samples": 1 << 30, "threads": args.threads}
+    longest = MODE_PRESETS[Mode.BALANCED].eye_path_length
     without = RenderSettings(mode=Mode.BALANCED, light_path_length=0, vlp_connections=0, **common)
     result: list[Contestant] = [
         Ours("PAPER", scene, RenderSettings(mode=Mode.PAPER, **common)),
         Ours("BALANCED", scene, RenderSettings(mode=Mode.BALANCED, **common)),
         Ours("BALANCED, C = 0", scene, without),
+        Ours("C = 0, roulette", scene, replace(without, mode=Mode.REFERENCE, eye_path_length=longest)),
     ]
     if args.no_cycles or path.suffix == ".npz":
         return result
-    size, scatterings = (scene.film.width, scene.film.height), MODE_PRESETS[Mode.BALANCED].eye_path_length
-    result.append(Cycles("Cycles", path, size, scatterings, args.threads))
+    size = (scene.film.width, scene.film.height)
+    result.append(Cycles("Cycles", path, size, longest, args.threads))
     if path.stem == "sierpinski":
         meshes = mesh_variant(path, MESH_LEVELS)
-        result.append(Cycles("Cycles, spheres as meshes", meshes, size, scatterings, args.threads))
+        result.append(Cycles("Cycles, spheres as meshes", meshes, size, longest, args.threads))
     return result
 
 
