@@ -140,7 +140,9 @@ def bench_scene(path: Path, args: argparse.Namespace) -> list[Row]:
 
 def entries(path: Path, scene: Scene, args: argparse.Namespace) -> list[Contestant]:
     """Who takes part. Cycles gets the eye path length of BALANCED, so that it does the work of the entry without VLPs
-    that ends walks by roulette, as Cycles does; point clouds come a second time as meshes, since inside glass its points are not spheres."""
+    that ends walks by roulette, as Cycles does; point clouds come a second time as meshes, since inside glass its
+    points are not spheres.
+    """
     common: dict[str, Any] = {"samples": 1 << 30, "threads": args.threads}
     longest = MODE_PRESETS[Mode.BALANCED].eye_path_length
     without = RenderSettings(mode=Mode.BALANCED, light_path_length=0, vlp_connections=0, **common)
