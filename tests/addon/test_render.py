@@ -49,7 +49,6 @@ def compare(tmp_path: Path) -> Any:
     scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
     settings, cycles = scene.vlp_bpt, scene.cycles
     settings.samples, settings.filter, settings.filter_width = 256, "BOX", 1.0
-    settings.splats = False  # in light of a single reflection, light samples alone are quieter than with splats
     cycles.samples, cycles.pixel_filter_type = 1024, "BOX"
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.sample_clamp_indirect = 0
