@@ -67,12 +67,13 @@ def apply_mode(self: Any, context: Any) -> None:
 
 
 _DEFAULTS = {
-    "light_path_length": 6,
-    "eye_path_length": 6,
+    "light_path_length": 8,
+    "eye_path_length": 16,
     "vlp_connections": 1,
     "vlp_candidates": 1,
     "light_samples": 1,
     "splats": True,
+    "roulette": True,
     "weighting": "BALANCE",
 } | preset("BALANCED")
 
@@ -163,6 +164,12 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
         description="Light that leaves the lamps may land on the picture from wherever it hits: sharp caustics, as "
         "under a glass, with far less noise. Costs little, and changes nothing else",
         default=_DEFAULTS["splats"],
+    )
+    roulette: bpy.props.BoolProperty(
+        name="Russian Roulette",
+        description="Paths end at random, the less light they carry the sooner, and those that go on count for more: "
+        "faster, and the picture stays right. Off, every path takes all its bounces, as in the paper",
+        default=_DEFAULTS["roulette"],
     )
     hits: bpy.props.BoolProperty(
         name="Lamp Hits",

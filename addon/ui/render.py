@@ -56,6 +56,7 @@ class VLP_BPT_PT_light_paths(_RenderPanel, bpy.types.Panel):
         hits.prop(settings, "light_samples")
         column.separator()
         column.prop(settings, "splats")
+        column.prop(settings, "roulette")
         clamps = column.column(align=True)
         clamps.prop(settings, "clamp_direct")
         clamps.prop(settings, "clamp_indirect")

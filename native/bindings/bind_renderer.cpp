@@ -51,7 +51,7 @@ PassSettings pass_of(const nb::dict& settings, bool transparent_film) {
     pass.splats = get<bool>(settings, "splats");
     pass.hits = get<bool>(settings, "hits");
     pass.weighting = weighting_of(get<std::string>(settings, "weighting"));
-    pass.roulette = get<std::string>(settings, "mode") == "REFERENCE";
+    pass.roulette = get<bool>(settings, "roulette");
     pass.clamp_direct = get<float>(settings, "clamp_direct");
     pass.clamp_indirect = get<float>(settings, "clamp_indirect");
     pass.transparent_film = transparent_film;

@@ -7,6 +7,10 @@
 
 namespace vlp {
 
+// Roulette spares eye walks that still carry this share of what they began with: an eye walk that goes on has a light sample and
+// a connection at each vertex, worth more than what ending it early saves.
+inline constexpr float k_spared_throughput = 2.0f / 3.0f;
+
 // The radiance that one path through pixel (x, y) of the full picture finds, y counted from the bottom. Each strategy's
 // share goes to sink.add(Contribution), each vertex of the walk to sink.visit(EyeWalk). Returns the pixel's alpha.
 template <typename Sink>
@@ -84,7 +88,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         if (!next.valid()) break;
         eye.throughput *= next.weight;
         if (pass.roulette) {
-            const float survive = min_of(1.0f, max_component(eye.throughput));
+            const float survive = min_of(1.0f, max_component(eye.throughput) / k_spared_throughput);
             if (u_roulette >= survive) break;
             eye.throughput *= 1.0f / survive;
         }

@@ -62,15 +62,16 @@ class ModePreset:
     vlp_candidates: int
     light_samples: int
     splats: bool
+    roulette: bool
     weighting: Weighting
     pixels_per_light_path: int
     light_vertices: int
 
 
 MODE_PRESETS: dict[Mode, ModePreset] = {
-    Mode.PAPER: ModePreset(1, 5, 1, 1, 1, False, Weighting.UNIFORM, 1, light_vertices=1 << 23),
-    Mode.BALANCED: ModePreset(6, 6, 1, 1, 1, True, Weighting.BALANCE, 4, light_vertices=1 << 23),
-    Mode.REFERENCE: ModePreset(64, 64, 1, 1, 1, True, Weighting.BALANCE, 4, light_vertices=1 << 21),
+    Mode.PAPER: ModePreset(1, 5, 1, 1, 1, False, False, Weighting.UNIFORM, 1, light_vertices=1 << 23),
+    Mode.BALANCED: ModePreset(8, 16, 1, 1, 1, True, True, Weighting.BALANCE, 4, light_vertices=1 << 23),
+    Mode.REFERENCE: ModePreset(64, 64, 1, 1, 1, True, True, Weighting.BALANCE, 4, light_vertices=1 << 21),
 }
 
 # The least and the most that a number may be, both allowed.
@@ -92,7 +93,7 @@ RANGES: dict[str, tuple[float, float]] = {
 
 _ENUMS: dict[str, type[StrEnum]] = {"mode": Mode, "weighting": Weighting, "filter": Filter, "device": Device}
 _REALS = ("time_limit", "clamp_direct", "clamp_indirect", "filter_width")
-_SWITCHES = ("splats", "hits")
+_SWITCHES = ("splats", "roulette", "hits")
 _ON_OFF = {"on": True, "true": True, "yes": True, "1": True, "off": False, "false": False, "no": False, "0": False}
 # What a mode decides where it is None.
 FROM_MODE = (
@@ -103,6 +104,7 @@ FROM_MODE = (
     "vlp_candidates",
     "light_samples",
     "splats",
+    "roulette",
     "weighting",
 )
 
@@ -115,8 +117,9 @@ class RenderSettings:
     eye_path_length: K, most surface hits of an eye path. light_paths: N, light paths of one iteration (0: chosen from
     the picture's size). vlp_connections: C, virtual light points joined to one eye vertex. vlp_candidates:
     M, how many each of them is chosen from, by the light that it would bring if nothing stood between. light_samples:
-    S, light samples at one eye vertex. splats: light paths are joined to the lens. hits: eye paths that meet a light
-    count.
+    S, light samples at one eye vertex. splats: light paths are joined to the lens. roulette: paths end at
+    random, the dimmer the sooner, and those that go on make up for it; else all of them go on up to L and K. hits: eye
+    paths that meet a light count.
     clamp_direct, clamp_indirect: the most that one find of light after at most one surface, or after more, may add to
     a pixel (mean of its channels); 0: no limit. Clamping removes bright specks and the light in them: it is a bias.
     threads: 0 for all.
@@ -135,6 +138,7 @@ class RenderSettings:
     vlp_candidates: int | None = None
     light_samples: int | None = None
     splats: bool | None = None
+    roulette: bool | None = None
     hits: bool = True
     weighting: Weighting | None = None
     clamp_direct: float = 0.0
@@ -203,6 +207,7 @@ class ResolvedSettings(RenderSettings):
     vlp_candidates: int = 1
     light_samples: int = 1
     splats: bool = True
+    roulette: bool = True
     weighting: Weighting = Weighting.BALANCE
 
 

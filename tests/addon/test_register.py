@@ -15,7 +15,7 @@ import addon
 from addon import preferences, properties
 from addon.export.settings import export_settings
 from addon.ui import reuse
-from vlp_bpt.settings import MODE_PRESETS, RANGES, Device, Filter, Mode, RenderSettings, Weighting
+from vlp_bpt.settings import FROM_MODE, MODE_PRESETS, RANGES, Device, Filter, Mode, RenderSettings, Weighting
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -51,7 +51,7 @@ def test_a_mode_writes_what_it_stands_for(mode: Mode) -> None:
     shown.light_paths = 123
     shown.vlp_connections = 77
     shown.mode = mode.value
-    for name in ("light_path_length", "eye_path_length", "vlp_connections", "light_samples", "splats", "weighting"):
+    for name in set(FROM_MODE) - {"light_paths"}:
         assert getattr(shown, name) == getattr(preset, name), name
     assert shown.light_paths == 0
     shown.eye_path_length = 9  # and leaves what is changed afterwards
@@ -70,6 +70,7 @@ def test_each_setting_is_exported() -> None:
         "vlp_connections": 2,
         "light_samples": 3,
         "splats": False,
+        "roulette": False,
         "hits": False,
         "weighting": "POWER",
         "filter": "GAUSSIAN",

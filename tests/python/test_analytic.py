@@ -45,7 +45,7 @@ from vlp_bpt.scene import (
     World,
 )
 
-HITS_ONLY: dict[str, Any] = {"light_samples": 0, "vlp_connections": 0, "splats": False}
+HITS_ONLY: dict[str, Any] = {"light_samples": 0, "vlp_connections": 0, "splats": False, "roulette": False}
 DIRECT: dict[str, Any] = {"light_path_length": 0, "vlp_connections": 0, "eye_path_length": 2}
 
 
@@ -200,7 +200,7 @@ def test_clear_bodies_vanish_under_a_white_sky() -> None:
         builder.add(sphere(), materials.glass(ior=1.5)).add(sphere((0.2, 0, 0.1), 0.4), materials.glass(ior=1.3)).scene
     )
     scene.world = World(radiance=(1, 1, 1))
-    options = settings(samples=16, light_path_length=0, eye_path_length=64)
+    options = settings(samples=16, light_path_length=0, eye_path_length=64, roulette=False)
     np.testing.assert_allclose(render(scene, options), 1.0, rtol=1e-4)
 
 

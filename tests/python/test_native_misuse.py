@@ -143,7 +143,7 @@ def native_renderer(**changes: Any) -> Any:
         {"light_path_length": 65}, {"eye_path_length": 65}, {"eye_path_length": 0}, {"light_paths": -1},
         {"light_paths": 2**40}, {"light_paths": 2**31, "light_path_length": 2}, {"weighting": "MEDIAN"},
         {"weighting": 3}, {"filter": "SHARP"}, {"filter_width": NAN}, {"filter_width": -1.0}, {"device": "ABACUS"},
-        {"seed": "x"}, {"threads": -1}, {"mode": None},
+        {"seed": "x"}, {"threads": -1}, {"roulette": None},
     ],
 )  # fmt: skip
 def test_native_settings_raise(changes: dict[str, Any]) -> None:
@@ -156,7 +156,7 @@ def test_native_settings_may_not_lack_one() -> None:
     scene.set_film(4, 3, 0, 0, 4, 3, False)
     scene.build(1)
     options = settings().resolved(4, 3).to_dict() | {"iteration_begin": 0}
-    for name in set(options) - {"samples", "time_limit"}:
+    for name in set(options) - {"mode", "samples", "time_limit"}:
         with pytest.raises((ValueError, TypeError, RuntimeError), match=name):
             _native.Renderer(scene, {k: v for k, v in options.items() if k != name})
 

@@ -15,9 +15,9 @@ from vlp_bpt.settings import FROM_MODE, MODE_PRESETS, Device
 @pytest.mark.parametrize(
     ("mode", "expected"),
     [
-        (Mode.PAPER, (1, 5, 1, 1, 1, False, Weighting.UNIFORM, 5000)),
-        (Mode.BALANCED, (6, 6, 1, 1, 1, True, Weighting.BALANCE, 1250)),
-        (Mode.REFERENCE, (64, 64, 1, 1, 1, True, Weighting.BALANCE, 1250)),
+        (Mode.PAPER, (1, 5, 1, 1, 1, False, False, Weighting.UNIFORM, 5000)),
+        (Mode.BALANCED, (8, 16, 1, 1, 1, True, True, Weighting.BALANCE, 1250)),
+        (Mode.REFERENCE, (64, 64, 1, 1, 1, True, True, Weighting.BALANCE, 1250)),
     ],
 )
 def test_a_mode_fills_what_is_open(mode: Mode, expected: tuple[Any, ...]) -> None:
@@ -29,6 +29,7 @@ def test_a_mode_fills_what_is_open(mode: Mode, expected: tuple[Any, ...]) -> Non
         settings.vlp_candidates,
         settings.light_samples,
         settings.splats,
+        settings.roulette,
         settings.weighting,
         settings.light_paths,
     )
@@ -45,6 +46,7 @@ def test_what_is_set_stays(mode: Mode) -> None:
         "vlp_connections": 0,
         "light_samples": 4,
         "splats": mode is Mode.PAPER,
+        "roulette": mode is Mode.PAPER,
         "vlp_candidates": 3,
         "weighting": Weighting.POWER,
     }

@@ -31,7 +31,7 @@ OPTIONS: dict[str, Any] = {
 @pytest.mark.parametrize(
     "change",
     [{}, {"splats": False}, {"hits": False}, {"vlp_connections": 0}, {"light_samples": 0}, {"weighting": "UNIFORM"},
-     {"mode": "REFERENCE"}],
+     {"roulette": False}],
 )  # fmt: skip
 @pytest.mark.parametrize("film", [Film(24, 20), Film(24, 20, (3, 5, 11, 9))])
 def test_weighted_pictures_add_up_to_the_render(change: dict[str, Any], film: Film) -> None:

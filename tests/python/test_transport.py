@@ -108,8 +108,8 @@ CHANGES: dict[str, dict[str, Any]] = {
     "C3_S4_N64": {"light_paths": 64, "vlp_connections": 3, "light_samples": 4},
     "uniform": {"weighting": "UNIFORM"},
     "power": {"weighting": "POWER"},
-    "roulette": {"mode": "REFERENCE"},
-    "roulette_L3": {"mode": "REFERENCE", "light_path_length": 3, "eye_path_length": 3},
+    "fixed": {"roulette": False},
+    "fixed_L3": {"roulette": False, "light_path_length": 3, "eye_path_length": 3},
 }
 
 
@@ -137,7 +137,7 @@ def many_lights_by_paths() -> Array:
 @pytest.mark.parametrize(
     "change",
     [{}, {"vlp_connections": 0, "light_samples": 3}, {"light_samples": 4, "vlp_connections": 3},
-     {"weighting": "POWER"}, {"mode": "REFERENCE"}],
+     {"weighting": "POWER"}, {"roulette": False}],
 )  # fmt: skip
 def test_many_lights_and_mirrors(change: dict[str, Any]) -> None:
     """Through mirrors and glass the windows differ in the paths that they find, so both are long: what only one of them
