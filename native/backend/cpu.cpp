@@ -70,13 +70,15 @@ public:
             stored_.resize(capacity);
         }
         if (pass.traces_light()) {
-            stored_in_piece_.resize((pass.light_paths + k_paths_per_piece - 1) / k_paths_per_piece + 1);
+            const uint32_t pieces = (pass.light_paths + k_paths_per_piece - 1) / k_paths_per_piece;
+            vertices_in_piece_.resize(pieces);
+            stored_in_piece_.resize(pieces + 1);
         }
     }
 
     bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
         if (tiles_.empty()) tiles_ = tiles_in_morton_order(film.window());
-        const uint32_t pieces = stored_in_piece_.empty() ? 0 : static_cast<uint32_t>(stored_in_piece_.size()) - 1;
+        const auto pieces = static_cast<uint32_t>(vertices_in_piece_.size());
         counters.work_done = 0;
         counters.work_total = pieces + static_cast<uint32_t>(tiles_.size());
         for_rows(film, [&](uint32_t begin, uint32_t end) { film.clear_splats(begin, end); });
@@ -112,19 +114,24 @@ private:
                   [&](uint32_t i) { body(i * k_rows, std::min((i + 1) * k_rows, height)); });
     }
 
+    // The first slot of a piece. Its paths' vertices follow one another from there on: less memory is touched than if each
+    // path had L slots of its own, so that more of it stays in the caches.
+    uint32_t first_slot(uint32_t piece) const { return piece * k_paths_per_piece * pass_.light_path_length; }
+
     // Traces all light paths, whose vertices are kept only where they serve as VLPs.
     void run_light_pass(uint32_t iteration, Film& film, const std::atomic<bool>& stop) {
-        pool_.run(static_cast<uint32_t>(stored_in_piece_.size()) - 1, [&](uint32_t piece) {
+        pool_.run(static_cast<uint32_t>(vertices_in_piece_.size()), [&](uint32_t piece) {
             if (stop) return;
             LightVertex path_alone[k_max_walk];
             SplatSink<AtomicAdd> sink{pass_, film.window(), film.splats().data(), {}};
-            uint32_t stored = 0;
+            uint32_t vertices = 0, stored = 0;
             const uint32_t end = std::min((piece + 1) * k_paths_per_piece, pass_.light_paths);
             for (uint32_t path = piece * k_paths_per_piece; path < end; ++path) {
-                LightVertex* slots =
-                    slots_ ? slots_.get() + static_cast<size_t>(path) * pass_.light_path_length : path_alone;
-                stored += trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots, sink);
+                LightVertex* slots = slots_ ? slots_.get() + first_slot(piece) + vertices : path_alone;
+                const auto counts = trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots, sink);
+                vertices += counts.vertices, stored += counts.connectible;
             }
+            vertices_in_piece_[piece] = vertices;
             stored_in_piece_[piece] = stored;
             count_dropped(sink.dropped);
             counters.work_done.fetch_add(1, std::memory_order_relaxed);
@@ -133,14 +140,12 @@ private:
 
     // Lists the slots that can be connected, in their order.
     LightVertexCache list_stored() {
-        const uint32_t pieces = static_cast<uint32_t>(stored_in_piece_.size()) - 1;
         stored_in_piece_.back() = 0;
         std::exclusive_scan(stored_in_piece_.begin(), stored_in_piece_.end(), stored_in_piece_.begin(), 0u);
-        pool_.run(pieces, [&](uint32_t piece) {
-            const uint32_t slots_per_piece = k_paths_per_piece * pass_.light_path_length;
-            const uint32_t end = std::min((piece + 1) * slots_per_piece, static_cast<uint32_t>(stored_.size()));
+        pool_.run(static_cast<uint32_t>(vertices_in_piece_.size()), [&](uint32_t piece) {
+            const uint32_t end = first_slot(piece) + vertices_in_piece_[piece];
             uint32_t next = stored_in_piece_[piece];
-            for (uint32_t slot = piece * slots_per_piece; slot < end; ++slot) {
+            for (uint32_t slot = first_slot(piece); slot < end; ++slot) {
                 if (slots_[slot].connectible()) stored_[next++] = slot;
             }
         });
@@ -173,6 +178,7 @@ private:
     ThreadPool pool_;
     LightVertexBuffer slots_;
     std::vector<uint32_t> stored_;
+    std::vector<uint32_t> vertices_in_piece_;
     std::vector<uint32_t> stored_in_piece_;  // first stored VLP of each piece, V last
     std::vector<Tile> tiles_;
 };

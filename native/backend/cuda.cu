@@ -28,7 +28,9 @@ __global__ void light_pass(SceneView scene, PassSettings pass, uint32_t iteratio
     if (path >= pass.light_paths) return;
     LightVertex* own = slots + static_cast<size_t>(path) * pass.light_path_length;
     SplatSink<AtomicAdd> sink{pass, window, splats, {}};
-    stored_in_path[path] = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
+    const LightPathCounts counts = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
+    for (uint32_t i = counts.vertices; i < pass.light_path_length; ++i) own[i].packed = 0;
+    stored_in_path[path] = counts.connectible;
     if (sink.dropped > 0) atomicAdd(dropped, static_cast<unsigned long long>(sink.dropped));
 }
 

@@ -1,6 +1,7 @@
 // Rays, and origins that do not hit the surface they leave.
 #pragma once
 
+#include "core/bits.h"
 #include "core/vec.h"
 
 namespace vlp {
@@ -10,17 +11,6 @@ struct Ray {
     Vec3 direction;  // unit length in world space
     float t_max = k_infinity;
 };
-
-VLP_HD inline int32_t bits_of(float x) {
-    int32_t i;
-    __builtin_memcpy(&i, &x, sizeof i);
-    return i;
-}
-VLP_HD inline float float_of(int32_t i) {
-    float x;
-    __builtin_memcpy(&x, &i, sizeof x);
-    return x;
-}
 
 // Moves `p` off a surface along its geometric normal `n`, which points to the side the ray leaves on.
 // Steps in units in the last place, so that it works at every scale (Wächter & Binder, Ray Tracing Gems, ch. 6).

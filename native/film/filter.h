@@ -25,15 +25,16 @@ VLP_HD inline float filter_radius(Filter filter, float width) {
     return 0;
 }
 
-// The Blackman-Harris window (Harris 1978, the 4-term one of 92 dB) over [0, 1], of integral 1, and that integral.
+// The Blackman-Harris window (Harris 1978, the 4-term one of 92 dB) over [0, 1], of integral 1, and that integral. It is
+// symmetric: x is in [0, 1/2].
 struct WindowValue {
     float density, cumulative;
 };
 
 VLP_HD inline WindowValue blackman_harris(float x) {
     constexpr float k_1 = 0.48829f / 0.35875f, k_2 = 0.14128f / 0.35875f, k_3 = 0.01168f / 0.35875f;
-    const Vec2 circle = unit_circle(x);
-    const float c = circle.x, s = circle.y;
+    const Vec2 p = cos_sin_half_turn(2 * x - 0.5f);
+    const float c = -p.y, s = p.x;  // of 2 pi x
     const float c2 = 2 * c * c - 1, s2 = 2 * s * c, c3 = c * c2 - s * s2, s3 = s * c2 + c * s2;
     return {max_of(0.0f, 1 - k_1 * c + k_2 * c2 - k_3 * c3),
             x - (k_1 * s - 0.5f * k_2 * s2 + k_3 / 3 * s3) * (0.5f * k_inv_pi)};
@@ -42,7 +43,7 @@ VLP_HD inline WindowValue blackman_harris(float x) {
 // The x whose cumulative is u: a polynomial in the fourth root of u that is good to 4e-4 in u, then one step of
 // Newton's method, which leaves 5e-7.
 VLP_HD inline float blackman_harris_inverse(float u) {
-    const float p = 0.5f - std::fabs(u - 0.5f);  // the window is symmetric
+    const float p = 0.5f - std::fabs(u - 0.5f);
     const float v = std::sqrt(std::sqrt(p));
     const float slope = 0.62942219f + v * (-0.3744739f + v * (1.27710818f + v * (-1.71217459f + v * 1.28380055f)));
     const float start = 0.5f - (0.84089642f - v) * slope;
@@ -73,7 +74,7 @@ VLP_HD inline float eval_1d(Filter filter, float width, float offset) {
         case Filter::gaussian:
             return 1.5957691f / width * std::exp(-8 * square(offset / width));  // 4 / sqrt(2 pi)
         case Filter::blackman_harris:
-            return blackman_harris(offset / (2 * width) + 0.5f).density / (2 * width);
+            return blackman_harris(0.5f - std::fabs(offset) / (2 * width)).density / (2 * width);
     }
     return 0;
 }

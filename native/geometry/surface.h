@@ -34,8 +34,11 @@ VLP_HD inline Vec3 normalize_or(Vec3 v, Vec3 fallback) {
     return size > 0 && size < k_infinity ? normalize(v * (1.0f / max_of(size, 1e-37f))) : fallback;
 }
 
-// The perpendicular of two edges, unit length; scales each edge first, as their product would vanish or overflow.
+// The perpendicular of two edges, unit length. Where their product might vanish or overflow, each edge is scaled first.
 VLP_HD inline Vec3 perpendicular(Vec3 a, Vec3 b, Vec3 fallback) {
+    const Vec3 product = cross(a, b);
+    const float size = length_squared(product);
+    if (size > 1e-30f && size < 1e30f) return product * (1.0f / std::sqrt(size));
     return normalize_or(cross(normalize_or(a, {}), normalize_or(b, {})), fallback);
 }
 

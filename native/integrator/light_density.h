@@ -21,16 +21,20 @@ VLP_HD inline bool is_on_light(const Light& light, const SurfacePoint& x_1) {
     return light.instance == x_1.instance && light.primitive == x_1.primitive;
 }
 
-// `dist_squared` and `normal` (at y_0) are not looked at when the light is infinite.
-VLP_HD inline LightEnd light_end(const SceneView& scene, uint32_t light_index, const SurfacePoint& x_1, Vec3 y_0,
-                                 Vec3 normal, Vec3 direction, float dist_squared) {
+// What next event from x_1 draws y_0 with once it has chosen the light: per solid angle, or 1 for a delta light.
+VLP_HD inline float pdf_next_event_from(const SceneView& scene, const Light& light, const SurfacePoint& x_1, Vec3 y_0,
+                                        Vec3 normal, Vec3 direction) {
+    if (is_delta(light)) return 1;
+    return is_on_light(light, x_1) ? 0.0f : pdf_next_event(scene, light, x_1.position, y_0, normal, direction);
+}
+
+// `next_event`: what pdf_next_event_from gives. `dist_squared` and `normal` (at y_0) are not looked at when the light is
+// infinite.
+VLP_HD inline LightEnd light_end(const SceneView& scene, uint32_t light_index, Vec3 y_0, Vec3 normal, Vec3 direction,
+                                 float dist_squared, float next_event) {
     const Light& light = scene.lights[light_index];
     const float choice = pdf_choose_light(scene, light_index);
     const EmissionPdf emission = pdf_emission(scene, light, y_0, normal, -direction);
-    float next_event = is_delta(light) ? 1.0f : 0.0f;
-    if (!is_delta(light) && !is_on_light(light, x_1)) {
-        next_event = pdf_next_event(scene, light, x_1.position, y_0, normal, direction);
-    }
     if (is_infinite(light)) return {choice * emission.direction, choice * next_event, emission.position};
     const float per_area = is_delta(light) ? 1.0f : abs_dot(normal, direction) / dist_squared;
     return {choice * emission.position, choice * next_event * per_area, emission.direction / dist_squared};

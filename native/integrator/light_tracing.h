@@ -7,14 +7,19 @@
 
 namespace vlp {
 
-// Traces light path `path` of an iteration into slots[0 ... L - 1], y_1 first; slots past its end are marked not valid.
-// Returns how many of them can be connected; each of these is joined to the lens too, for sink.add(Splat), as far as
-// sink.wanted(i) and sink.reaches(film). `stream` keeps the pilot's paths apart from the render's.
+// What a light path left in its slots: so many vertices, of which so many can be connected.
+struct LightPathCounts {
+    uint32_t vertices = 0, connectible = 0;
+};
+
+// Traces light path `path` of an iteration into slots[0], slots[1], ..., y_1 first, L at most. Each vertex that can be
+// connected is joined to the lens too, for sink.add(Splat), as far as sink.wanted(i) and sink.reaches(film). `stream` keeps
+// the pilot's paths apart from the render's.
 template <typename Sink>
-VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettings& pass, Stream stream,
-                                        uint32_t iteration, uint32_t path, LightVertex* slots, Sink& sink) {
-    for (uint32_t i = 0; i < pass.light_path_length; ++i) slots[i].packed = 0;
-    if (scene.light_count == 0) return 0;
+VLP_HD inline LightPathCounts trace_light_path(const SceneView& scene, const PassSettings& pass, Stream stream,
+                                               uint32_t iteration, uint32_t path, LightVertex* slots, Sink& sink) {
+    LightPathCounts counts;
+    if (scene.light_count == 0) return counts;
 
     // The paths of an iteration are one stratified set.
     const uint32_t seed = hash(pass.seed, stream, iteration);
@@ -27,7 +32,7 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
     const bool infinite = is_infinite(light);
 
     Rgb throughput = emission.weight * (1.0f / choice.pdf);
-    if (is_black(throughput) || !is_finite(throughput)) return 0;
+    if (is_black(throughput) || !is_finite(throughput)) return counts;
     const Rgb emitted_throughput = throughput;
 
     // y_0 as the weights see it. The end of a path at infinity is a direction: its density is per solid angle, and y_1
@@ -39,7 +44,6 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
     Anchor from{emission.position, emission.normal, {light.instance, light.primitive}};
     if (light.instance != k_none) ray.origin = leave(from, ray.direction);
 
-    uint32_t connectible = 0;
     for (uint32_t i = 1; i <= pass.light_path_length; ++i) {
         const uint32_t key = hash(seed ^ path, k_transparency_stream, i);
         const Step step = walk(scene, ray, from.id, false, key, NoLights{});
@@ -62,8 +66,10 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
         }
         if (!(vertex.pdf_area > 0) || !is_finite(vertex.pdf_area) || !is_finite(vertex.rev_geometry)) break;
         if (i == 1) {
-            const LightEnd end = light_end(scene, choice.index, y, emission.position, emission.normal, -ray.direction,
-                                           edge.dist_squared);
+            const float next_event =
+                pdf_next_event_from(scene, light, y, emission.position, emission.normal, -ray.direction);
+            const LightEnd end = light_end(scene, choice.index, emission.position, emission.normal, -ray.direction,
+                                           edge.dist_squared, next_event);
             vertex.next_event_ratio = end.pdf_emission > 0 ? end.pdf_next_event / end.pdf_emission : 0.0f;
         }
 
@@ -76,10 +82,11 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
         vertex.instance = y.instance;
         vertex.primitive = y.primitive;
         vertex.rev_ratio = 0;
-        vertex.packed = LightVertex::k_valid | (i << LightVertex::k_index_shift) | y.material;
+        vertex.packed = (i << LightVertex::k_index_shift) | y.material;
+        counts.vertices = i;
         if (material.has_finite) {  // Listing 2: save a VLP
             vertex.packed |= LightVertex::k_connectible;
-            ++connectible;
+            ++counts.connectible;
             if (sink.wanted(i)) {
                 lens_sampler.dimension = i;
                 connect_to_lens(scene, pass, vertex, y, -ray.direction, lens_sampler.next_2d(), sink);
@@ -89,14 +96,16 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
 
         // The next ray of Listing 2, off any kind of surface.
         const Bsdf bsdf = make_bsdf(scene, y);
-        const float u_lobe = sampler.next();
+        sampler.dimension = 3 * i;
         const Vec2 u = sampler.next_2d();
+        const float u_lobe = bsdf.is_diffuse() ? 0.0f : sampler.next();
         const BsdfSample next = sample(bsdf, -ray.direction, Walk::light, u_lobe, u);
         if (!next.valid()) break;
         throughput *= next.weight;
         if (pass.roulette) {
             const float survive = min_of(1.0f, max_component(throughput) / max_component(emitted_throughput));
-            if (sampler.next() >= survive) break;
+            sampler.dimension = 3 * i + 2;
+            if (survive < 1 && sampler.next() >= survive) break;
             throughput *= 1.0f / survive;
         }
         if (is_black(throughput) || !is_finite(throughput)) break;
@@ -110,7 +119,7 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
         from = anchor_of(y);
         ray = {leave(from, next.direction), next.direction};
     }
-    return connectible;
+    return counts;
 }
 
 }  // namespace vlp

@@ -39,9 +39,9 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
     if (!event.delta && n <= pass.eye_path_length + 1) {
         sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0));
     }
-    if (pass.light_path_length > 0 && (eye.t > 2 || pass.splats)) {
-        const LightEnd end =
-            light_end(scene, choice.index, x_1, event.position, event.normal, event.direction, dist_squared);
+    if (pass.traces_light() && (eye.t > 2 || pass.splats)) {
+        const LightEnd end = light_end(scene, choice.index, event.position, event.normal, event.direction, dist_squared,
+                                       event.pdf_solid_angle);
         const float ratio = end.pdf_emission / end.pdf_next_event * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
         add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, at_x_1.pdf_eye * eye.last().rev_geometry);
     }

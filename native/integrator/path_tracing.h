@@ -20,18 +20,19 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
     Sampler sampler = make_sampler(seed, iteration);
     const Vec2 center{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
     const Vec2 film = center + sample(pass.filter, pass.filter_width, sampler.next_2d());
-    Ray ray = sample_ray(scene.camera, film, sampler.next_2d());
+    Ray ray = sample_ray(scene.camera, film, scene.camera.aperture_radius > 0 ? sampler.next_2d() : Vec2{});
 
     EyeWalk eye;
+    eye.vertices[0] = {};
     float pdf_solid_angle = 1;  // of the direction that the walk took last
     PrimitiveId skip{};
     Anchor from{ray.origin - ray.direction * distance_from_lens(scene.camera, ray), {}, {}};
     const bool has_vlps = pass.kappa > 0 && cache.stored_count > 0 && pass.vlp_connections > 0;
     // Every step draws from dimensions of its own, so that a path's later draws do not shift with its earlier ones.
-    const uint32_t draws_per_step = 4 + 2 * pass.light_samples + 2 * pass.vlp_connections;
+    const uint32_t draws_per_step = 2 * pass.light_samples + 2 * pass.vlp_connections + 3;
 
     for (uint32_t hits = 1; hits <= pass.eye_path_length; ++hits) {
-        sampler.dimension = 2 + (hits - 1) * draws_per_step;
+        const uint32_t first_draw = 2 + (hits - 1) * draws_per_step;
         const bool from_camera = eye.t == 1;
         const uint32_t key = hash(seed ^ iteration, k_transparency_stream, hits);
         const LightHits<Sink> lights{scene, pass, eye, ray.direction, pdf_solid_angle, sink};
@@ -64,10 +65,15 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         sink.visit(eye);
 
         const Bsdf bsdf = make_bsdf(scene, z);
-        const float u_lobe = sampler.next();
-        const Vec2 u_direction = sampler.next_2d();
-        const float u_roulette = sampler.next();
         if (scene.materials[z.material].has_finite) {  // Listing 3: sample lights and VLPs
+            const auto draw_vlp = [&](uint32_t i) {
+                sampler.dimension = first_draw + 2 * (pass.light_samples + i);
+                const uint32_t u_vlp = sampler.next_bits();
+                prefetch_virtual_light_points(cache, pass.vlp_candidates, u_vlp);
+                return u_vlp;
+            };
+            uint32_t u_next_vlp = has_vlps ? draw_vlp(0) : 0;
+            sampler.dimension = first_draw;
             for (uint32_t i = 0; scene.light_count > 0 && i < pass.light_samples; ++i) {
                 const uint32_t u_light = sampler.next_bits();
                 Contribution c = sample_light(scene, pass, eye, bsdf, u_light, sampler.next_2d());
@@ -75,8 +81,10 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
                 sink.add(c);
             }
             for (uint32_t i = 0; has_vlps && i < pass.vlp_connections; ++i) {
-                const uint32_t u_vlp = sampler.next_bits();
+                const uint32_t u_vlp = u_next_vlp;
+                sampler.dimension = first_draw + 2 * (pass.light_samples + i) + 1;
                 const float u_keep = pass.vlp_candidates > 1 ? sampler.next() : 0.0f;
+                if (i + 1 < pass.vlp_connections) u_next_vlp = draw_vlp(i + 1);
                 Contribution c = connect_virtual_light_point(scene, pass, cache, eye, bsdf, u_vlp, u_keep);
                 c.value *= 1.0f / static_cast<float>(pass.vlp_connections);
                 sink.add(c);
@@ -84,12 +92,16 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         }
         if (hits == pass.eye_path_length) break;
 
+        sampler.dimension = first_draw + draws_per_step - 3;
+        const Vec2 u_direction = sampler.next_2d();
+        const float u_lobe = bsdf.is_diffuse() ? 0.0f : sampler.next();
         const BsdfSample next = sample(bsdf, eye.w_eye, Walk::eye, u_lobe, u_direction);
         if (!next.valid()) break;
         eye.throughput *= next.weight;
         if (pass.roulette) {
             const float survive = min_of(1.0f, max_component(eye.throughput) / k_spared_throughput);
-            if (u_roulette >= survive) break;
+            sampler.dimension = first_draw + draws_per_step - 1;
+            if (survive < 1 && sampler.next() >= survive) break;
             eye.throughput *= 1.0f / survive;
         }
         if (is_black(eye.throughput)) break;

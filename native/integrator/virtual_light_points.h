@@ -87,6 +87,25 @@ VLP_HD inline VlpConnection join_unshadowed(const SceneView& scene, const PassSe
     return joined;
 }
 
+// Candidate `i` of the M of a connection that draws `u`: one of the V stored VLPs, from the i-th stratum of them.
+VLP_HD inline uint32_t candidate_index(const LightVertexCache& cache, uint32_t candidates, uint32_t i, uint32_t u) {
+    const uint64_t stratum = ((static_cast<uint64_t>(i) << 32) + u) / candidates;
+    return static_cast<uint32_t>((stratum * cache.stored_count) >> 32);
+}
+
+// Asks for the memory of the VLPs that a connection will read, which lie anywhere: a light sample takes as long as they
+// take to arrive.
+VLP_HD inline void prefetch_virtual_light_points([[maybe_unused]] const LightVertexCache& cache,
+                                                 [[maybe_unused]] uint32_t candidates, [[maybe_unused]] uint32_t u) {
+#if !VLP_ON_DEVICE
+    for (uint32_t i = 0; i < candidates; ++i) {
+        const LightVertex* vlp = cache.slots + cache.stored[candidate_index(cache, candidates, i, u)];
+        __builtin_prefetch(vlp);
+        __builtin_prefetch(vlp - 1);  // the weights look at the vertices before it
+    }
+#endif
+}
+
 // One of the C connections at z_{t-1}: of M candidates, drawn evenly over the V stored VLPs, one is kept in proportion to the
 // light that it would bring if nothing stood between (Talbot, Cline & Egbert 2005), and a ray is sent to that one. The
 // estimate is of what all VLPs of an iteration bring; the caller averages over C. One candidate stands for V VLPs of
@@ -98,9 +117,8 @@ VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, c
     VlpConnection kept{{.t = eye.t}, {}, {}};
     float kept_light = 0, light = 0;
     for (uint32_t i = 0; i < candidates; ++i) {
-        const uint64_t stratum = ((static_cast<uint64_t>(i) << 32) + u) / candidates;
-        const uint64_t index = (stratum * cache.stored_count) >> 32;
-        const VlpConnection next = join_unshadowed(scene, pass, cache, eye, eye_bsdf, static_cast<uint32_t>(index));
+        const uint32_t index = candidate_index(cache, candidates, i, u);
+        const VlpConnection next = join_unshadowed(scene, pass, cache, eye, eye_bsdf, index);
         const float next_light = average(next.found.value * next.found.weight);
         if (!is_finite(next_light)) return next.found;  // for the sink to count
         if (!(next_light > 0)) continue;

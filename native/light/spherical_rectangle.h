@@ -1,7 +1,7 @@
 // Uniform directions to a rectangle (Ureña et al. 2013, "An Area-Preserving Parametrization for Spherical Rectangles").
 #pragma once
 
-#include "core/vec.h"
+#include "core/warp.h"
 
 namespace vlp {
 
@@ -24,8 +24,8 @@ struct SphericalRectangle {
 VLP_HD inline SphericalRectangle make_spherical(const SeenRectangle& r) {
     const auto slope = [&](float x) { return x / std::sqrt(x * x + r.height * r.height); };
     const float n0 = -slope(r.low.y), n1 = slope(r.high.x), n2 = slope(r.high.y), n3 = -slope(r.low.x);
-    const float excess_23 = std::asin(n2 * n3) + std::asin(n3 * n0);
-    return {n0, n2, excess_23, std::asin(n0 * n1) + std::asin(n1 * n2) + excess_23};
+    const float excess_23 = arc_sine(n2 * n3) + arc_sine(n3 * n0);
+    return {n0, n2, excess_23, arc_sine(n0 * n1) + arc_sine(n1 * n2) + excess_23};
 }
 
 // A point of the rectangle, in its plane.

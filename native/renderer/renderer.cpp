@@ -14,7 +14,7 @@ float pilot_vlps_per_path(const SceneView& scene, const PassSettings& pass) {
     uint32_t stored = 0;
     for (uint32_t path = 0; path < k_pilot_paths; ++path) {
         NoSplats none;
-        stored += trace_light_path(scene, pass, k_pilot_stream, 0, path, slots.data(), none);
+        stored += trace_light_path(scene, pass, k_pilot_stream, 0, path, slots.data(), none).connectible;
     }
     return static_cast<float>(stored) / static_cast<float>(k_pilot_paths);
 }

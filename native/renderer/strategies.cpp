@@ -44,11 +44,11 @@ void StrategyRenderer::iterate(uint32_t iteration) {
     const SceneView& scene = scene_->view();
     stored_.clear();
     LightSink splats{*this};
-    for (size_t first = 0; first < slots_.size(); first += pass_.light_path_length) {
-        const auto path = static_cast<uint32_t>(first / pass_.light_path_length);
-        trace_light_path(scene, pass_, k_light_stream, iteration, path, &slots_[first], splats);
+    uint32_t end = 0;
+    for (uint32_t path = 0; path < pass_.light_paths && pass_.traces_light(); ++path) {
+        end += trace_light_path(scene, pass_, k_light_stream, iteration, path, &slots_[end], splats).vertices;
     }
-    for (uint32_t slot = 0; slot < slots_.size(); ++slot) {
+    for (uint32_t slot = 0; slot < end; ++slot) {
         if (slots_[slot].connectible()) stored_.push_back(slot);
     }
     const LightVertexCache cache{slots_.data(), stored_.data(), static_cast<uint32_t>(stored_.size())};

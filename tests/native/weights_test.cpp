@@ -121,7 +121,7 @@ TEST_P(WeightsTest, EqualTheReference) {
             pass.roulette = counts.light == 5;
             pass.seed = 11;
             pass = with_kappa(scene->view(), pass);
-            for (uint32_t iteration = 0; iteration < 2; ++iteration) {
+            for (uint32_t iteration = 0; iteration < 3; ++iteration) {
                 compare_weights(scene->view(), pass, iteration, errors);
                 if (HasFatalFailure()) return;
             }

@@ -7,7 +7,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,8 @@ from vlp_bpt.snapshot import load_snapshot, scene_digest
 from .contestants import Contestant, Cycles, Ours, race
 from .references import FOLDER, batches, fingerprint
 
-ROUNDS = 8
-CHECKPOINTS = (2, 4, 8)  # rounds after which the error is taken
+ROUNDS = 6
+CHECKPOINTS = (1, 3, 6)  # rounds after which the error is taken
 MESH_LEVELS = 4
 
 
@@ -139,18 +139,17 @@ def bench_scene(path: Path, args: argparse.Namespace) -> list[Row]:
 
 
 def entries(path: Path, scene: Scene, args: argparse.Namespace) -> list[Contestant]:
-    """Who takes part. Cycles gets the eye path length of BALANCED, so that it does the work of the entry without VLPs
-    that ends walks by roulette, as Cycles does; point clouds come a second time as meshes, since inside glass its
-    points are not spheres.
+    """Who takes part. Path tracing alone is BALANCED without light paths. Cycles gets the same eye path length, and both
+    end walks by roulette; point clouds come a second time as meshes, since inside glass Cycles' points are not spheres.
     """
     common: dict[str, Any] = {"samples": 1 << 30, "threads": args.threads}
     longest = MODE_PRESETS[Mode.BALANCED].eye_path_length
-    without = RenderSettings(mode=Mode.BALANCED, light_path_length=0, vlp_connections=0, **common)
+    without = RenderSettings(light_path_length=0, vlp_connections=0, **common)
     result: list[Contestant] = [
         Ours("PAPER", scene, RenderSettings(mode=Mode.PAPER, **common)),
         Ours("BALANCED", scene, RenderSettings(mode=Mode.BALANCED, **common)),
-        Ours("BALANCED, C = 0", scene, without),
-        Ours("C = 0, roulette", scene, replace(without, mode=Mode.REFERENCE, eye_path_length=longest)),
+        Ours("REFERENCE", scene, RenderSettings(mode=Mode.REFERENCE, **common)),
+        Ours("path tracing alone", scene, without),
     ]
     if args.no_cycles or path.suffix == ".npz":
         return result
