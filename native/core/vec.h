@@ -60,7 +60,7 @@ VLP_HD constexpr Vec3 cross(Vec3 a, Vec3 b) {
 }
 VLP_HD constexpr float length_squared(Vec3 a) { return dot(a, a); }
 VLP_HD inline float length(Vec3 a) { return std::sqrt(dot(a, a)); }
-VLP_HD inline Vec3 normalize(Vec3 a) { return a * (1.0f / length(a)); }
+VLP_HD VLP_FORCE_INLINE Vec3 normalize(Vec3 a) { return a * (1.0f / length(a)); }
 VLP_HD constexpr float abs_dot(Vec3 a, Vec3 b) {
     const float d = dot(a, b);
     return d < 0 ? -d : d;

@@ -5,6 +5,7 @@
 // own: Cycles always takes 1.
 #pragma once
 
+#include "core/bits.h"
 #include "core/warp.h"
 
 namespace vlp {
@@ -25,45 +26,36 @@ VLP_HD inline float filter_radius(Filter filter, float width) {
     return 0;
 }
 
-// The Blackman-Harris window (Harris 1978, the 4-term one of 92 dB) over [0, 1], of integral 1, and that integral. It is
-// symmetric: x is in [0, 1/2].
-struct WindowValue {
-    float density, cumulative;
-};
-
-VLP_HD inline WindowValue blackman_harris(float x) {
+// The Blackman-Harris window (Harris 1978, the 4-term one of 92 dB) over [0, 1], of integral 1, at x in [0, 1/2]; the other
+// half is its mirror image.
+VLP_HD inline float blackman_harris(float x) {
     constexpr float k_1 = 0.48829f / 0.35875f, k_2 = 0.14128f / 0.35875f, k_3 = 0.01168f / 0.35875f;
-    const Vec2 p = cos_sin_half_turn(2 * x - 0.5f);
-    const float c = -p.y, s = p.x;  // of 2 pi x
-    const float c2 = 2 * c * c - 1, s2 = 2 * s * c, c3 = c * c2 - s * s2, s3 = s * c2 + c * s2;
-    return {max_of(0.0f, 1 - k_1 * c + k_2 * c2 - k_3 * c3),
-            x - (k_1 * s - 0.5f * k_2 * s2 + k_3 / 3 * s3) * (0.5f * k_inv_pi)};
+    const float c = -cos_sin_half_turn(2 * x - 0.5f).y;  // of 2 pi x
+    return max_of(0.0f, 1 - k_1 * c + k_2 * (2 * c * c - 1) - k_3 * c * (4 * c * c - 3));
 }
 
-// The x whose cumulative is u: a polynomial in the fourth root of u that is good to 4e-4 in u, then one step of
-// Newton's method, which leaves 5e-7.
-VLP_HD inline float blackman_harris_inverse(float u) {
-    const float p = 0.5f - std::fabs(u - 0.5f);
-    const float v = std::sqrt(std::sqrt(p));
-    const float slope = 0.62942219f + v * (-0.3744739f + v * (1.27710818f + v * (-1.71217459f + v * 1.28380055f)));
-    const float start = 0.5f - (0.84089642f - v) * slope;
-    const WindowValue at = blackman_harris(start);
-    const float x = clamp(start - (at.cumulative - p) / max_of(at.density, 1e-4f), 0.0f, 0.5f);
-    return 0.5f + std::copysign(0.5f - x, u - 0.5f);
+// A table for each bell-shaped filter, filled by filter_tables.cpp: how far from the pixel's centre, in widths, lies the
+// point beyond which there is the share p of the filter, p <= 1/2. Cubic polynomials over eighths of octaves of p, which
+// are where floats keep their third bit after the point: as precise far out as near the centre.
+inline constexpr uint32_t k_filter_octaves = 24, k_filter_pieces = 8 * k_filter_octaves + 1;
+inline constexpr uint32_t k_filter_table_size = 4 * k_filter_pieces;  // floats
+inline constexpr float k_least_filter_share = 0x1p-25f;
+
+VLP_HD inline float filter_distance(const float* table, float p) {
+    constexpr int32_t k_piece_shift = 20, k_first_piece = (127 - 25) << 3;
+    const int32_t bits = bits_of(max_of(p, k_least_filter_share));
+    const float* const c = table + 4 * ((bits >> k_piece_shift) - k_first_piece);
+    const float t = static_cast<float>(bits & ((1 << k_piece_shift) - 1)) * 0x1p-20f;
+    return c[0] + t * (c[1] + t * (c[2] + t * c[3]));
 }
 
 // Offset from the pixel's centre (pixels).
-VLP_HD inline Vec2 sample(Filter filter, float width, Vec2 u) {
-    switch (filter) {
-        case Filter::box:
-            return {width * (u.x - 0.5f), width * (u.y - 0.5f)};
-        case Filter::gaussian:  // Box & Muller 1958; u has 24 bits, so that no sample lies beyond 5.8 deviations
-            return 0.25f * width * std::sqrt(-2 * std::log(1 - u.x)) * unit_circle(u.y);
-        case Filter::blackman_harris:
-            return {2 * width * (blackman_harris_inverse(u.x) - 0.5f),
-                    2 * width * (blackman_harris_inverse(u.y) - 0.5f)};
-    }
-    return {};
+VLP_HD inline Vec2 sample(Filter filter, float width, const float* tables, Vec2 u) {
+    const Vec2 v = u - Vec2{0.5f, 0.5f};
+    if (filter == Filter::box) return width * v;
+    const float* const table = tables + (filter == Filter::gaussian ? 0 : k_filter_table_size);
+    return {std::copysign(width * filter_distance(table, 0.5f - std::fabs(v.x)), v.x),
+            std::copysign(width * filter_distance(table, 0.5f - std::fabs(v.y)), v.y)};
 }
 
 VLP_HD inline float eval_1d(Filter filter, float width, float offset) {
@@ -74,7 +66,7 @@ VLP_HD inline float eval_1d(Filter filter, float width, float offset) {
         case Filter::gaussian:
             return 1.5957691f / width * std::exp(-8 * square(offset / width));  // 4 / sqrt(2 pi)
         case Filter::blackman_harris:
-            return blackman_harris(0.5f - std::fabs(offset) / (2 * width)).density / (2 * width);
+            return blackman_harris(0.5f - std::fabs(offset) / (2 * width)) / (2 * width);
     }
     return 0;
 }

@@ -19,7 +19,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
     const uint32_t seed = hash(pass.seed, k_eye_stream, y * scene.camera.width + x);
     Sampler sampler = make_sampler(seed, iteration);
     const Vec2 center{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
-    const Vec2 film = center + sample(pass.filter, pass.filter_width, sampler.next_2d());
+    const Vec2 film = center + sample(pass.filter, pass.filter_width, scene.filter_tables, sampler.next_2d());
     Ray ray = sample_ray(scene.camera, film, scene.camera.aperture_radius > 0 ? sampler.next_2d() : Vec2{});
 
     EyeWalk eye;

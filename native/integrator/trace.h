@@ -45,8 +45,8 @@ struct NoLights {
 // throughput)` is called for each free stretch of the way, whose t_max is where it ends, and `lights.on_surface` for each
 // surface that is met, passed or not.
 template <typename Lights>
-VLP_HD inline Step walk(const SceneView& scene, Ray ray, PrimitiveId skip, bool from_camera, uint32_t key,
-                        const Lights& lights) {
+VLP_HD VLP_FORCE_INLINE Step walk(const SceneView& scene, Ray ray, PrimitiveId skip, bool from_camera, uint32_t key,
+                                  const Lights& lights) {
     Step step;
     const float t_end = ray.t_max;
     float travelled = 0;

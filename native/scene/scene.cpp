@@ -7,6 +7,7 @@
 #include <string>
 
 #include "bsdf/albedo_tables.h"
+#include "film/filter_tables.h"
 #include "geometry/octahedral.h"
 #include "light/light.h"
 #include "scene/input_checks.h"
@@ -215,6 +216,7 @@ SceneView Scene::view_placed(const Place& place) const {
     v.environment.rows_below = placed(world_tables_.rows_below, place);
     v.environment.columns_below = placed(world_tables_.columns_below, place);
     v.albedo_tables = placed(albedo_tables(), place);
+    v.filter_tables = placed(filter_tables(), place);
     v.bvh = {placed(bvh_.nodes, place), placed(bvh_.triangle_blocks, place), placed(bvh_.sphere_blocks, place),
              placed(bvh_.instance_roots, place), bvh_.root};
     v.geometry_count = static_cast<uint32_t>(geometries_.size());

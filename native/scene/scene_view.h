@@ -74,6 +74,7 @@ struct SceneView {
     Vec3 center;                  // of the sphere around every surface and lamp
     float radius = 1;
     const float* albedo_tables = nullptr;  // see bsdf/albedo.h
+    const float* filter_tables = nullptr;  // see film/filter.h
 };
 
 }  // namespace vlp

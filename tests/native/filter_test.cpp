@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "film/filter.h"
+#include "film/filter_tables.h"
 #include "goodness_of_fit.h"
 
 namespace vlp::test {
@@ -19,7 +19,7 @@ TEST(PixelFilter, SamplesFollowTheFilter) {
         for (const float width : {1.0f, 1.5f}) {
             const float extent = 2 * filter_radius(filter, width) * (filter == Filter::box ? 1.0f : 0.7f);
             const auto draw = [&](float (&point)[2]) {
-                const Vec2 x = sample(filter, width, random.next_2d());
+                const Vec2 x = sample(filter, width, filter_tables().data(), random.next_2d());
                 EXPECT_LE(max_of(std::fabs(x.x), std::fabs(x.y)), filter_radius(filter, width));
                 point[0] = x.x / extent + 0.5f, point[1] = x.y / extent + 0.5f;
                 return point[0] >= 0 && point[0] < 1 && point[1] >= 0 && point[1] < 1;
@@ -57,20 +57,39 @@ TEST(PixelFilter, IntegralIsOne) {
     }
 }
 
-TEST(PixelFilter, BlackmanHarrisInverse) {
-    EXPECT_EQ(blackman_harris_inverse(0.5f), 0.5f);
-    float last = 0;
-    for (int i = 0; i < 1 << 16; ++i) {
-        const float u = static_cast<float>(i) * 0x1p-16f, x = blackman_harris_inverse(u);
-        const float below = blackman_harris(min_of(x, 1 - x)).cumulative;
-        EXPECT_NEAR(x < 0.5f ? below : 1 - below, u, 7e-7f);
-        EXPECT_GE(x, last - 1e-6f);
-        EXPECT_LE(x, 1.0f);
-        last = x;
+// Numbers u in [0, 1) are those of the sampler: whole multiples of 2^-24.
+TEST(PixelFilter, SamplesInvertTheFilter) {
+    for (const Filter filter : {Filter::gaussian, Filter::blackman_harris}) {
+        const float* const tables = filter_tables().data();
+        double last = -2;
+        for (int i = 0; i < 1 << 16; ++i) {
+            const float u = i < 1000 ? static_cast<float>(i) * 0x1p-24f : static_cast<float>(i) * 0x1p-16f;
+            const double x = static_cast<double>(sample(filter, 1.0f, tables, {u, u}).y);
+            const double share = filter_share_beyond(filter, std::fabs(x)),
+                         p = 0.5 - std::fabs(static_cast<double>(u) - 0.5);
+            EXPECT_NEAR(share, p, 4e-7) << u;
+            if (p > 0) {
+                EXPECT_NEAR(share / p, 1, 1e-4) << u;
+            }
+            if (i != 1000) {
+                EXPECT_GE(x, last - 1e-7) << u;
+            }
+            last = x;
+        }
+        EXPECT_EQ(sample(filter, 1.0f, tables, {0.5f, 0.5f}).x, 0);
+        EXPECT_LE(sample(filter, 1.0f, tables, {1 - 0x1p-24f, 0}).x, filter_radius(filter, 1.0f));
     }
-    EXPECT_LE(blackman_harris_inverse(1 - 0x1p-24f), 1.0f);
-    EXPECT_NEAR(blackman_harris(0.5f).cumulative, 0.5f, 1e-6);
-    EXPECT_NEAR(blackman_harris(0).density, 0, 2e-4);
+}
+
+// The shares that the tables invert are those of `eval_1d`.
+TEST(PixelFilter, SharesAreIntegrals) {
+    for (const Filter filter : {Filter::gaussian, Filter::blackman_harris}) {
+        for (double x = 0.02; x < 0.95; x += 0.03) {
+            const double slope = (filter_share_beyond(filter, x - 1e-4) - filter_share_beyond(filter, x + 1e-4)) / 2e-4;
+            EXPECT_NEAR(slope, static_cast<double>(eval_1d(filter, 1.0f, static_cast<float>(x))), 1e-6) << x;
+        }
+        EXPECT_NEAR(filter_share_beyond(filter, 0), 0.5, 1e-12);
+    }
 }
 
 }  // namespace
