@@ -35,17 +35,17 @@ VLP_HD inline float blackman_harris(float x) {
 }
 
 // A table for each bell-shaped filter, filled by filter_tables.cpp: how far from the pixel's centre, in widths, lies the
-// point beyond which there is the share p of the filter, p <= 1/2. Cubic polynomials over eighths of octaves of p, which
-// are where floats keep their third bit after the point: as precise far out as near the centre.
-inline constexpr uint32_t k_filter_octaves = 24, k_filter_pieces = 8 * k_filter_octaves + 1;
+// point beyond which there is the share p of the filter, p <= 1/2. Cubic polynomials over sixteenths of octaves of p, which
+// are where floats keep their fourth bit after the point: as precise far out as near the centre.
+inline constexpr uint32_t k_filter_octaves = 24, k_filter_pieces = 16 * k_filter_octaves + 1;
 inline constexpr uint32_t k_filter_table_size = 4 * k_filter_pieces;  // floats
 inline constexpr float k_least_filter_share = 0x1p-25f;
 
 VLP_HD inline float filter_distance(const float* table, float p) {
-    constexpr int32_t k_piece_shift = 20, k_first_piece = (127 - 25) << 3;
+    constexpr int32_t k_piece_shift = 19, k_first_piece = (127 - 25) << 4;
     const int32_t bits = bits_of(max_of(p, k_least_filter_share));
     const float* const c = table + 4 * ((bits >> k_piece_shift) - k_first_piece);
-    const float t = static_cast<float>(bits & ((1 << k_piece_shift) - 1)) * 0x1p-20f;
+    const float t = static_cast<float>(bits & ((1 << k_piece_shift) - 1)) * 0x1p-19f;
     return c[0] + t * (c[1] + t * (c[2] + t * c[3]));
 }
 

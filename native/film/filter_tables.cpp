@@ -29,8 +29,8 @@ double distance_of(Filter filter, double share) {
 // Each piece takes its values and slopes at both ends from the filter (Hermite).
 void append_table(Filter filter, std::vector<float>& table) {
     for (uint32_t piece = 0; piece < k_filter_pieces; ++piece) {
-        const double octave = std::ldexp(static_cast<double>(k_least_filter_share), static_cast<int>(piece / 8));
-        const double low = octave * (1 + piece % 8 / 8.0), high = low + octave / 8;
+        const double octave = std::ldexp(static_cast<double>(k_least_filter_share), static_cast<int>(piece / 16));
+        const double low = octave * (1 + piece % 16 / 16.0), high = low + octave / 16;
         if (low >= 0.5) {  // the centre itself
             table.insert(table.end(), {0, 0, 0, 0});
             continue;

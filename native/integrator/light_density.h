@@ -21,11 +21,13 @@ VLP_HD inline bool is_on_light(const Light& light, const SurfacePoint& x_1) {
     return light.instance == x_1.instance && light.primitive == x_1.primitive;
 }
 
-// What next event from x_1 draws y_0 with once it has chosen the light: per solid angle, or 1 for a delta light.
-VLP_HD inline float pdf_next_event_from(const SceneView& scene, const Light& light, const SurfacePoint& x_1, Vec3 y_0,
+// What next event from x_1 draws y_0 with: per solid angle, or the probability of a delta light.
+VLP_HD inline float pdf_next_event_from(const SceneView& scene, uint32_t light_index, const SurfacePoint& x_1, Vec3 y_0,
                                         Vec3 normal, Vec3 direction) {
-    if (is_delta(light)) return 1;
-    return is_on_light(light, x_1) ? 0.0f : pdf_next_event(scene, light, x_1.position, y_0, normal, direction);
+    const Light& light = scene.lights[light_index];
+    const float choice = pdf_choose_light(scene, x_1, light_index);
+    if (is_delta(light)) return choice;
+    return is_on_light(light, x_1) ? 0.0f : choice * pdf_next_event(scene, light, x_1.position, y_0, normal, direction);
 }
 
 // `next_event`: what pdf_next_event_from gives. `dist_squared` and `normal` (at y_0) are not looked at when the light is
@@ -33,11 +35,11 @@ VLP_HD inline float pdf_next_event_from(const SceneView& scene, const Light& lig
 VLP_HD inline LightEnd light_end(const SceneView& scene, uint32_t light_index, Vec3 y_0, Vec3 normal, Vec3 direction,
                                  float dist_squared, float next_event) {
     const Light& light = scene.lights[light_index];
-    const float choice = pdf_choose_light(scene, light_index);
+    const float choice = pdf_choose_source(scene, light_index);
     const EmissionPdf emission = pdf_emission(scene, light, y_0, normal, -direction);
-    if (is_infinite(light)) return {choice * emission.direction, choice * next_event, emission.position};
+    if (is_infinite(light)) return {choice * emission.direction, next_event, emission.position};
     const float per_area = is_delta(light) ? 1.0f : abs_dot(normal, direction) / dist_squared;
-    return {choice * emission.position, choice * next_event * per_area, emission.direction / dist_squared};
+    return {choice * emission.position, next_event * per_area, emission.direction / dist_squared};
 }
 
 }  // namespace vlp

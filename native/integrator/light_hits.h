@@ -24,7 +24,7 @@ VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings&
     const float dist_squared = length_squared(position - x_1.position);
     const float eye_pdf =
         is_infinite(light) ? pdf_solid_angle : pdf_solid_angle * abs_dot(normal, direction) / dist_squared;
-    const float next_event = pdf_next_event_from(scene, light, x_1, position, normal, direction);
+    const float next_event = pdf_next_event_from(scene, light_index, x_1, position, normal, direction);
     const LightEnd end = light_end(scene, light_index, position, normal, direction, dist_squared, next_event);
     StrategySum sum = strategy_sum(pass, strategy_count(pass, 0));
     if (!eye.last().specular) sum.add(end.pdf_next_event / eye_pdf, strategy_count(pass, 1));

@@ -25,7 +25,7 @@ VLP_HD inline LightPathCounts trace_light_path(const SceneView& scene, const Pas
     const uint32_t seed = hash(pass.seed, stream, iteration);
     Sampler sampler = make_sampler(seed, path);
     Sampler lens_sampler = make_sampler(hash(seed, k_lens_stream), path);
-    const DiscreteSample choice = choose_light(scene, sampler.next_bits());
+    const DiscreteSample choice = choose_source(scene, sampler.next_bits());
     const Light& light = scene.lights[choice.index];
     const Vec2 u_position = sampler.next_2d(), u_direction = sampler.next_2d();
     const Emission emission = sample_emission(scene, light, u_position, u_direction);
@@ -67,7 +67,7 @@ VLP_HD inline LightPathCounts trace_light_path(const SceneView& scene, const Pas
         if (!(vertex.pdf_area > 0) || !is_finite(vertex.pdf_area) || !is_finite(vertex.rev_geometry)) break;
         if (i == 1) {
             const float next_event =
-                pdf_next_event_from(scene, light, y, emission.position, emission.normal, -ray.direction);
+                pdf_next_event_from(scene, choice.index, y, emission.position, emission.normal, -ray.direction);
             const LightEnd end = light_end(scene, choice.index, emission.position, emission.normal, -ray.direction,
                                            edge.dist_squared, next_event);
             vertex.next_event_ratio = end.pdf_emission > 0 ? end.pdf_next_event / end.pdf_emission : 0.0f;

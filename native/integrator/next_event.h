@@ -11,9 +11,9 @@ namespace vlp {
 VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye,
                                         const Bsdf& bsdf, uint32_t u_light, Vec2 u) {
     Contribution found{.s = 1, .t = eye.t};
-    const DiscreteSample choice = choose_light(scene, u_light);
-    const Light& light = scene.lights[choice.index];
     const SurfacePoint& x_1 = eye.surface;
+    const DiscreteSample choice = choose_light(scene, x_1, u_light);
+    const Light& light = scene.lights[choice.index];
     if (is_on_light(light, x_1)) return found;
     const NextEvent event = sample_next_event(scene, light, x_1.position, u);
     if (!event.valid()) return found;
@@ -40,8 +40,8 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
         sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0));
     }
     if (pass.traces_light() && (eye.t > 2 || pass.splats)) {
-        const LightEnd end = light_end(scene, choice.index, event.position, event.normal, event.direction, dist_squared,
-                                       event.pdf_solid_angle);
+        const LightEnd end =
+            light_end(scene, choice.index, event.position, event.normal, event.direction, dist_squared, pdf_next_event);
         const float ratio = end.pdf_emission / end.pdf_next_event * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
         add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, at_x_1.pdf_eye * eye.last().rev_geometry);
     }

@@ -128,7 +128,7 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
 
     // Of each vertex in the light walk and in the eye walk; the lens is chosen alike in every strategy.
     std::vector<double> by_light(n, 1), by_eye(n, 1);
-    const double choice = pdf_choose_light(scene, path.light);
+    const double choice = pdf_choose_source(scene, path.light);
     const EmissionPdf emission = pdf_emission(scene, light, position_0, normal_0, x_0.to_eye);
     if (infinite) {  // x_0 is a direction, and x_1 is where a ray through the disc around the scene meets a surface
         by_light[0] = choice * emission.direction;
@@ -147,7 +147,7 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
         if (i > 0 || !infinite) by_eye[i] = per_area(by_eye[i], from.position, to.position, to.geometric_normal);
     }
     by_eye[n - 2] = n > 2 ? film_density(scene.camera, path.x[n - 2]) : 1;
-    double next_event = choice;
+    double next_event = pdf_choose_light(scene, x_1.surface, path.light);
     if (is_on_light(light, x_1.surface)) {
         next_event = 0;
     } else if (!is_delta(light)) {

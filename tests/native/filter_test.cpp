@@ -67,7 +67,7 @@ TEST(PixelFilter, SamplesInvertTheFilter) {
             const double x = static_cast<double>(sample(filter, 1.0f, tables, {u, u}).y);
             const double share = filter_share_beyond(filter, std::fabs(x)),
                          p = 0.5 - std::fabs(static_cast<double>(u) - 0.5);
-            EXPECT_NEAR(share, p, 4e-7) << u;
+            EXPECT_NEAR(share, p, 1.5e-7) << u;
             if (p > 0) {
                 EXPECT_NEAR(share / p, 1, 1e-4) << u;
             }

@@ -139,7 +139,7 @@ TEST(LightChoice, WidthsAreExact) {
     EXPECT_NEAR(pdf({below.data(), 5}, 4), 0.5, 1e-6);
     EXPECT_EQ(pdf({below.data(), 5}, 0), 0x1p-32f);
     EXPECT_TRUE(make_distribution({}).empty());
-    EXPECT_EQ(choose_light(SceneView{}, 7).index, k_none);
+    EXPECT_EQ(choose_source(SceneView{}, 7).index, k_none);
 }
 
 // One lamp of 10,000 chosen at a time gives the sum over all of them, to 5 standard errors (6e-7).
@@ -167,8 +167,8 @@ TEST(LightChoice, TenThousandLamps) {
     double sum = 0, squares = 0;
     constexpr int k_draws = 1000000;
     for (int i = 0; i < k_draws; ++i) {
-        const DiscreteSample choice = choose_light(scene, hash(k_seed, static_cast<uint32_t>(i)));
-        ASSERT_EQ(choice.pdf, pdf_choose_light(scene, choice.index));
+        const DiscreteSample choice = choose_source(scene, hash(k_seed, static_cast<uint32_t>(i)));
+        ASSERT_EQ(choice.pdf, pdf_choose_source(scene, choice.index));
         const NextEvent e = sample_next_event(scene, lights[choice.index], receiver, random.next_2d());
         const double x = static_cast<double>(e.radiance.g * e.direction.z / (e.pdf_solid_angle * choice.pdf));
         sum += x, squares += x * x;

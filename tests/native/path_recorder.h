@@ -88,7 +88,7 @@ struct LightStart {
 };
 inline LightStart repeat_emission(const SceneView& scene, const PassSettings& pass, uint32_t iteration, uint32_t path) {
     Sampler sampler = make_sampler(hash(pass.seed, k_light_stream, iteration), path);
-    const DiscreteSample choice = choose_light(scene, sampler.next_bits());
+    const DiscreteSample choice = choose_source(scene, sampler.next_bits());
     const Vec2 u_position = sampler.next_2d(), u_direction = sampler.next_2d();
     return {choice.index, sample_emission(scene, scene.lights[choice.index], u_position, u_direction)};
 }
