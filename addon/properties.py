@@ -13,7 +13,7 @@ MODES = (
         "BALANCED",
         "Balanced",
         "The least noise for the time. Light paths are short, and every way of finding light counts as much as it is "
-        "good at it. Light that bounces more often than the path lengths below allow is lost",
+        "good at it. Paths end by chance once they carry little light",
     ),
     (
         "REFERENCE",
