@@ -94,13 +94,14 @@ def _render(engine: Any, depsgraph: Any, picture: Picture, started: float) -> No
         return
     engine.update_stats("", "Building the scene")
     renderer = vlp_bpt.Renderer(scene, settings)
-    for warning in renderer.warnings:
-        notes.warn(warning)
-    _report(engine, depsgraph, notes.warnings)
+    _forget_reports(engine, depsgraph)
+    _report(engine, renderer, notes)
     try:
         renderer.render(_Watcher(engine, depsgraph, renderer, picture, len(notes.warnings)), _Break(engine))
     except vlp_bpt.Cancelled:
         return
+    finally:
+        _report(engine, renderer, notes)  # of a device that has failed
     picture.fill(renderer)
     _record(engine, depsgraph, renderer, time.perf_counter() - started, notes.warnings)
 
@@ -214,13 +215,19 @@ def _place_of_layer(depsgraph: Any) -> tuple[int, int]:
     return names.index(name), len(names)
 
 
-def _report(engine: Any, depsgraph: Any, warnings: list[str]) -> None:
-    """Reports each warning once in a picture or animation."""
+def _forget_reports(engine: Any, depsgraph: Any) -> None:
+    """At the first layer of a picture or of an animation."""
     scene = depsgraph.scene
     starts = not engine.is_animation or scene.frame_current == scene.frame_start
     if starts and _place_of_layer(depsgraph)[0] == 0:
         _reported.clear()
-    for warning in warnings:
+
+
+def _report(engine: Any, renderer: Any, notes: Notes) -> None:
+    """Reports each warning, the renderer's too, once in a picture or animation."""
+    for warning in renderer.warnings:
+        notes.warn(warning)
+    for warning in notes.warnings:
         if warning not in _reported:
             _reported.add(warning)
             engine.report({"WARNING"}, f"VLP-BPT: {warning}")

@@ -153,7 +153,7 @@ private:
 std::unique_ptr<Backend> make_cuda_backend(const Scene& scene, const PassSettings& pass) {
     int count = 0;
     check_cuda(cudaGetDeviceCount(&count), "no usable GPU");
-    if (count == 0) throw std::runtime_error("device CUDA: there is no GPU; choose CPU");
+    if (count == 0) throw std::runtime_error("device CUDA: there is no GPU");
     return std::make_unique<CudaBackend>(scene, pass);
 }
 

@@ -6,7 +6,7 @@
 namespace vlp {
 
 std::unique_ptr<Backend> make_cuda_backend(const Scene&, const PassSettings&) {
-    throw std::runtime_error("device CUDA: this build of VLP-BPT has no CUDA back end; choose CPU");
+    throw std::runtime_error("device CUDA: this build of VLP-BPT has no CUDA back end");
 }
 
 std::vector<DeviceInfo> cuda_devices() { return {}; }

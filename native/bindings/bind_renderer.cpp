@@ -1,7 +1,9 @@
 // Python's Renderer, and the devices there are.
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include <array>
 #include <stdexcept>
@@ -138,15 +140,20 @@ void bind_renderer(nb::module_& m) {
     nb::class_<Renderer>(m, "Renderer")
         .def("__init__",
              [](Renderer* self, std::shared_ptr<Scene> scene, const nb::dict& settings) {
-                 const PassSettings pass = pass_of(scene, settings);
+                 const PassSettings asked = pass_of(scene, settings);
                  const auto device = get<std::string>(settings, "device");
-                 const auto threads = get<uint32_t>(settings, "threads"),
+                 const auto threads = get<uint32_t>(settings, "threads"), samples = get<uint32_t>(settings, "samples"),
                             first = get<uint32_t>(settings, "iteration_begin");
                  nb::gil_scoped_release release;
-                 new (self) Renderer(scene, pass, device, threads, first);
+                 const PassSettings pass = for_scene(scene->view(), asked);
+                 const uint32_t end = samples < k_none - first ? first + samples : k_none;
+                 new (self)
+                     Renderer(scene, pass, scene->window(), make_devices(device, *scene, pass, threads), first, end);
              })
         .def("iterate", &Renderer::iterate, nb::arg("count"), nb::call_guard<nb::gil_scoped_release>())
         .def("cancel", &Renderer::cancel)
+        .def(
+            "rest", [](Renderer& r) { r.rest(); }, nb::call_guard<nb::gil_scoped_release>())
         .def("set_deadline", &Renderer::set_deadline, nb::arg("seconds"))
         .def("progress", &Renderer::progress)
         .def(
@@ -171,13 +178,15 @@ void bind_renderer(nb::module_& m) {
             nb::arg("threads"))
         .def("memory", [](const Renderer& r) { return memory_of(r, r.scene()); })
         .def_prop_ro("iterations", [](const Renderer& r) { return r.film().iterations(); })
-        .def_prop_ro("vlps", [](const Renderer& r) { return r.counters().stored_vlps.load(); })
-        .def_prop_ro("dropped", [](const Renderer& r) { return r.counters().dropped.load(); })
+        .def_prop_ro("vlps", [](const Renderer& r) { return r.stored_vlps(); })
+        .def_prop_ro("dropped", [](const Renderer& r) { return r.dropped(); })
         .def_prop_ro("light_paths", &traced_light_paths)
         .def_prop_ro("paths",
                      [](const Renderer& r) {
                          return r.film().iterations() * (r.film().window().pixel_count() + traced_light_paths(r));
                      })
+        .def_prop_ro("ranges", [](const Renderer& r) { return r.iterations().finished(); })
+        .def_prop_ro("notes", &Renderer::notes)
         .def_prop_ro("kappa", [](const Renderer& r) { return r.pass().kappa; });
     nb::class_<StrategyRenderer>(m, "StrategyRenderer")
         .def("__init__",

@@ -14,6 +14,11 @@ void Film::clear_splats(uint32_t row_begin, uint32_t row_end) {
     std::fill(row(row_begin), row(row_end), ExactSum{});
 }
 
+void Film::clear() {
+    std::fill(sums_.begin(), sums_.end(), ExactSum{});
+    iterations_ = 0;
+}
+
 void Film::commit_rows(uint32_t begin, uint32_t end) {
     const size_t first = static_cast<size_t>(begin) * window_.width, last = static_cast<size_t>(end) * window_.width;
     for (size_t i = first; i < last; ++i) {

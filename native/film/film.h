@@ -25,6 +25,7 @@ public:
           sums_(window.pixel_count() * 4) {}
 
     const Window& window() const { return window_; }
+    bool has_splats() const { return !splats_.empty(); }
     // The iteration under way, row by row from the bottom; counts only once it is committed.
     std::span<PixelSample> frame() { return frame_; }
     // What light paths add to its pixels, red, green and blue, in any order (see add_shared).
@@ -33,6 +34,8 @@ public:
     // Adds rows [begin, end) of the frame, and of the splats, to the sums.
     void commit_rows(uint32_t begin, uint32_t end);
     void count_iteration() { ++iterations_; }
+    // As when it was made.
+    void clear();
 
     uint64_t iterations() const { return iterations_; }
     std::span<const ExactSum> sums() const { return sums_; }

@@ -31,34 +31,109 @@ PassSettings for_scene(const SceneView& scene, PassSettings pass) {
     return pass;
 }
 
-namespace {
-
-std::unique_ptr<Backend> make_backend(const std::string& device, const Scene& scene, const PassSettings& pass,
-                                      unsigned threads) {
-    if (device == "CUDA") return make_cuda_backend(scene, pass);
-    if (device == "AUTO" || device == "CPU") return make_cpu_backend(scene, pass, threads);
-    throw std::runtime_error("device " + device + " is not available in this version: choose AUTO, CPU or CUDA");
+Devices make_devices(const std::string& device, const Scene& scene, const PassSettings& pass, unsigned threads) {
+    Devices devices;
+    if (device != "AUTO" && device != "CPU" && device != "CUDA" && device != "HYBRID") {
+        throw std::runtime_error("device " + device + ": must be AUTO, CPU, CUDA or HYBRID");
+    }
+    if (device == "CUDA" || device == "HYBRID") {
+        try {
+            devices.main = make_cuda_backend(scene, pass);
+        } catch (const std::runtime_error& error) {
+            devices.notes.push_back(std::string(error.what()) + "; rendering on the CPU");
+        }
+    }
+    auto& place = devices.main ? devices.helper : devices.main;
+    const auto cpu = [&scene, pass, threads] { return make_cpu_backend(scene, pass, threads); };
+    if (device != "CUDA" || !devices.main) {
+        place = cpu();
+    } else {
+        devices.spare = cpu;
+    }
+    return devices;
 }
 
-}  // namespace
-
-Renderer::Renderer(std::shared_ptr<const Scene> scene, PassSettings pass, const std::string& device, unsigned threads,
-                   uint32_t first_iteration)
+Renderer::Renderer(std::shared_ptr<const Scene> scene, const PassSettings& pass, Window window, Devices devices,
+                   uint32_t first, uint32_t end)
     : scene_(std::move(scene)),
-      pass_(for_scene(scene_->view(), pass)),
-      film_(scene_->window(), pass_.splats),
-      backend_(make_backend(device, *scene_, pass_, threads)),
-      next_iteration_(first_iteration) {}
+      pass_(pass),
+      film_(window, pass.splats),
+      main_(std::move(devices.main)),
+      active_(main_.get()),
+      helper_(devices.helper ? std::make_unique<Helper>(std::move(devices.helper), film_) : nullptr),
+      spare_(std::move(devices.spare)),
+      notes_(std::move(devices.notes)),
+      iterations_(first),
+      end_(end) {}
 
 uint32_t Renderer::iterate(uint32_t count) {
     stop_ = false;
     uint32_t done = 0;
     while (done < count && !stop_ && std::chrono::steady_clock::now() < deadline_) {
-        if (!backend_->run_iteration(next_iteration_, film_, stop_)) break;
-        ++next_iteration_;
-        ++done;
+        if (collect_from_helper() || run_one()) ++done;
+    }
+    return stop_ ? done + rest() : done;
+}
+
+bool Renderer::collect_from_helper() {
+    if (!helper_) return false;
+    const std::optional<uint32_t> finished = helper_->collect(film_);
+    if (finished) iterations_.finish(*finished);
+    return finished.has_value();
+}
+
+// An iteration by the main device, while the helper, if any, is kept at work. Whether one was completed.
+bool Renderer::run_one() {
+    if (helper_ && helper_->idle()) {
+        if (const auto next = iterations_.take(end_)) helper_->start(*next);
+    }
+    std::optional<uint32_t> own = iterations_.take(helper_ ? end_ : k_none);
+    if (!own && helper_ && !helper_->idle()) {
+        // The last one is the helper's: whoever is sooner done with it.
+        if (helper_->seconds_left() <= took_) {
+            helper_->wait(stop_);
+            return false;
+        }
+        if (const auto undone = helper_->abandon()) iterations_.give_back(*undone);
+        own = iterations_.take(end_);
+    }
+    if (!own) own = iterations_.take(k_none);
+    if (!own) return false;
+
+    const auto start = std::chrono::steady_clock::now();
+    bool done = false;
+    try {
+        done = active_.load()->run_iteration(*own, film_, stop_);
+    } catch (const std::runtime_error& error) {
+        iterations_.give_back(*own);
+        if (!helper_ && !spare_) throw;
+        done = rest() > 0;
+        go_on_without_main(error.what());
+        return done;
+    }
+    if (done) {
+        iterations_.finish(*own);
+        took_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    } else {
+        iterations_.give_back(*own);
     }
     return done;
+}
+
+// Nothing is lost: the film holds complete iterations.
+void Renderer::go_on_without_main(const char* reason) {
+    instead_of_main_ = helper_ ? helper_->release() : spare_();
+    active_ = instead_of_main_.get();
+    helper_.reset();
+    spare_ = nullptr;
+    notes_.push_back(std::string(reason) + "; going on with the CPU");
+}
+
+uint32_t Renderer::rest() {
+    const uint32_t collected = collect_from_helper() ? 1 : 0;
+    if (!helper_) return 0;
+    if (const auto undone = helper_->abandon()) iterations_.give_back(*undone);
+    return collected;
 }
 
 void Renderer::set_deadline(double seconds) {
@@ -68,8 +143,16 @@ void Renderer::set_deadline(double seconds) {
                     : Clock::time_point::max();
 }
 
+uint64_t Renderer::dropped() const {
+    uint64_t sum = main_->counters.dropped;
+    if (instead_of_main_) sum += instead_of_main_->counters.dropped;
+    return helper_ ? sum + helper_->backend().counters.dropped : sum;
+}
+
+size_t Renderer::backend_bytes() const { return active_.load()->bytes() + (helper_ ? helper_->backend().bytes() : 0); }
+
 float Renderer::progress() const {
-    const BackendCounters& c = backend_->counters;
+    const BackendCounters& c = active_.load()->counters;
     return static_cast<float>(c.work_done) / static_cast<float>(c.work_total);
 }
 

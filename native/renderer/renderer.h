@@ -3,42 +3,74 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "backend/backend.h"
+#include "renderer/helper.h"
+#include "renderer/iterations.h"
 
 namespace vlp {
 
 class Scene;
 
+// What renders: one device, and one that helps it.
+struct Devices {
+    std::unique_ptr<Backend> main, helper;  // helper: may be null
+    std::function<std::unique_ptr<Backend>()> spare;  // instead of `main` if that fails and nobody helps; may be empty
+    std::vector<std::string> notes;  // why they are not what was asked for
+};
+
+// Those of a setting `device`. Where there is no usable GPU, CUDA and HYBRID come down to the CPU, with a note.
+Devices make_devices(const std::string& device, const Scene& scene, const PassSettings& pass, unsigned threads);
+
 class Renderer {
 public:
-    // `pass.kappa` is set here, from a pilot light pass over the scene. Iterations count from `first_iteration`, which
-    // decides their random numbers: ranges rendered apart add up to what one renderer makes of the whole.
-    Renderer(std::shared_ptr<const Scene> scene, PassSettings pass, const std::string& device, unsigned threads,
-             uint32_t first_iteration);
+    // `pass` as for_scene gives it. Iterations count from `first`, which decides their random numbers: ranges rendered apart
+    // add up to what one renderer makes of the whole. A helper takes none from `end` on.
+    Renderer(std::shared_ptr<const Scene> scene, const PassSettings& pass, Window window, Devices devices,
+             uint32_t first, uint32_t end);
 
-    // Runs up to `count` iterations; fewer when cancelled or past the deadline. Returns how many were completed.
+    // Runs up to `count` iterations; fewer when cancelled or past the deadline. Returns how many were completed. A helper may
+    // go on with one of its own afterwards, until `rest` or the next call.
     uint32_t iterate(uint32_t count);
-    // Makes the `iterate` that is running return within milliseconds, the iteration under way undone; from any thread.
+    // Makes the `iterate` that is running return within milliseconds, the iterations under way undone; from any thread.
     void cancel() { stop_ = true; }
     // From now; no iteration starts later. 0 or less: no deadline.
     void set_deadline(double seconds);
+    // Throws away what a helper has under way. Returns how many iterations it had finished unnoticed.
+    uint32_t rest();
 
     float progress() const;  // of the iteration under way, 0 to 1
-    const BackendCounters& counters() const { return backend_->counters; }
+    uint32_t stored_vlps() const { return active_.load()->counters.stored_vlps; }
+    uint64_t dropped() const;  // estimates that were not finite
     const PassSettings& pass() const { return pass_; }
     const Scene& scene() const { return *scene_; }
     Film& film() { return film_; }
     const Film& film() const { return film_; }
-    size_t backend_bytes() const { return backend_->bytes(); }
+    const Iterations& iterations() const { return iterations_; }
+    size_t backend_bytes() const;
+    // What the user should hear about the devices: why one was left out.
+    const std::vector<std::string>& notes() const { return notes_; }
 
 private:
+    bool collect_from_helper();
+    bool run_one();
+    void go_on_without_main(const char* reason);
+
     std::shared_ptr<const Scene> scene_;
     PassSettings pass_;
     Film film_;
-    std::unique_ptr<Backend> backend_;
-    uint32_t next_iteration_;
+    std::unique_ptr<Backend> main_, instead_of_main_;  // the latter once the former has failed
+    std::atomic<Backend*> active_;  // the one of these that renders
+    std::unique_ptr<Helper> helper_;
+    std::function<std::unique_ptr<Backend>()> spare_;
+    std::vector<std::string> notes_;
+    Iterations iterations_;
+    uint32_t end_;
+    double took_ = 0;  // seconds of the last iteration, without the helper's
     std::atomic<bool> stop_{false};
     std::chrono::steady_clock::time_point deadline_ = std::chrono::steady_clock::time_point::max();
 };

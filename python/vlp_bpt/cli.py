@@ -208,9 +208,11 @@ def _render(options: argparse.Namespace) -> int:
     snapshot, warnings, settings = _scene_to_render(options, kind, values)
     first = iterations[0] if iterations is not None else 0
     renderer = Renderer(snapshot.scene, settings, first_iteration=first)
-    _warn(warnings + renderer.warnings)
+    warnings += renderer.warnings
+    _warn(warnings)
     with ProgressDisplay(quiet=options.quiet) as display:
         image = renderer.render(lambda progress: display.show(renderer, progress))
+    _warn([warning for warning in renderer.warnings if warning not in warnings])  # of a device that has failed
     image.metadata["source"] = snapshot.metadata | {"file": options.file.name}
     if iterations is not None:
         image.metadata["scene"] = scene_digest(snapshot.scene)

@@ -75,11 +75,12 @@ class Renderer:
 
     Raises SceneError or SettingsError for what cannot be rendered, DeviceError when the device fails. `first_iteration`
     begins a later range of the same render: ranges rendered apart merge to the picture that one render makes.
-    `warnings` holds those about the scene. Calls may come from any thread; `iterate` and `read` wait for each other.
+    `warnings` are about the scene, and about devices that are not what was asked for, also once one fails during a render,
+    which then goes on without it. Calls may come from any thread; `iterate` and `read` wait for each other.
     """
 
     def __init__(self, scene: Scene, settings: RenderSettings | None = None, *, first_iteration: int = 0) -> None:
-        self.warnings = scene.validate()
+        self._scene_warnings = scene.validate()
         self.film = scene.film
         self.settings = (settings or RenderSettings()).resolved(scene.film.width, scene.film.height)
         self.first_iteration = first_iteration
@@ -89,7 +90,6 @@ class Renderer:
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._seconds = 0.0
-        self._rendered = 0  # iterations made here, without those of film states added
         started = time.perf_counter()
         native = load_native()
         with native_errors():
@@ -99,6 +99,11 @@ class Renderer:
             options = self.settings.to_dict() | {"iteration_begin": first_iteration}
             self._native = native.Renderer(self._scene, options)
         self._build_seconds = time.perf_counter() - started
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should hear, in whole sentences."""
+        return self._scene_warnings + list(self._native.notes)
 
     @property
     def iterations(self) -> int:
@@ -114,12 +119,13 @@ class Renderer:
     def statistics(self) -> Statistics:
         """What was rendered so far and what it took."""
         _, _, width, height = self.film.render_window
+        rendered = sum(end - begin for begin, end in self._native.ranges.items())  # here, not in film states added
         return Statistics(
             iterations=self.iterations,
             seconds=self._seconds,
             build_seconds=self._build_seconds,
-            eye_samples=self._rendered * width * height,
-            light_paths=self._rendered * int(self._native.light_paths),
+            eye_samples=rendered * width * height,
+            light_paths=rendered * int(self._native.light_paths),
             vlps=int(self._native.vlps),
             dropped=int(self._native.dropped),
             memory={name: int(size) for name, size in self._native.memory().items()},
@@ -133,7 +139,10 @@ class Renderer:
         stop it likewise and are raised on, so the picture stays that of the complete iterations.
         """
         self._stop.clear()
-        return self._iterate(count, poll)
+        try:
+            return self._iterate(count, poll)
+        finally:
+            self._native.rest()
 
     def cancel(self) -> None:
         """Makes the `iterate` or `render` that is running return, from any thread; the picture so far stays."""
@@ -196,7 +205,7 @@ class Renderer:
             "version": __version__,
             "settings": self.settings.to_dict(),
             "iterations": self.iterations,
-            "ranges": [[self.first_iteration, self.first_iteration + self._rendered]],
+            "ranges": [list(range_) for range_ in sorted(self._native.ranges.items())],
             "seconds": round(self._seconds, 3),
             "seed": self.settings.seed,
             "film": {"width": self.film.width, "height": self.film.height, "window": list(self.film.render_window)},
@@ -230,8 +239,6 @@ class Renderer:
                     self._native.cancel()
                     worker.join(_POLL_SECONDS)
                 self._seconds += time.perf_counter() - started
-                if outcome and isinstance(outcome[0], int):
-                    self._rendered += outcome[0]
         result = outcome[0]
         if isinstance(result, BaseException):
             with native_errors():
@@ -270,6 +277,7 @@ class _Session:
                 break
             chunk = max(1, min(2 * chunk, int(_REPORT_SECONDS / max(took / completed, 1e-6))))
         renderer._native.set_deadline(0.0)
+        renderer._native.rest()
 
     def _stopped(self) -> bool:
         return self.renderer._stop.is_set() or (self.cancel is not None and self.cancel.is_set())

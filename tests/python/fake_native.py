@@ -44,9 +44,20 @@ class FakeRenderer:
         self.asked: list[int] = []
         self.threads: set[str] = set()
         self._stop = threading.Event()
+        self.notes: list[str] = []
+        self.resting = True
+
+    @property
+    def ranges(self) -> dict[int, int]:
+        first = self.settings["iteration_begin"]
+        return {first: self.next} if self.next > first else {}
+
+    def rest(self) -> None:
+        self.resting = True
 
     def iterate(self, count: int) -> int:
         self._stop.clear()
+        self.resting = False
         self.asked.append(count)
         self.threads.add(threading.current_thread().name)
         if FakeRenderer.fails is not None:

@@ -14,7 +14,7 @@ import pytest
 from small_scenes import room
 from terminals import OnTerminal
 
-from vlp_bpt import Mode, RenderSettings, __version__
+from vlp_bpt import Mode, RenderSettings, __version__, devices
 from vlp_bpt.images import Image, read_image, write_image
 from vlp_bpt.snapshot import Snapshot, save_snapshot
 
@@ -211,8 +211,15 @@ def test_a_scene_that_cannot_be_rendered(folder: Path) -> None:
     (folder / "junk.vlp.npz").write_bytes(b"junk")
     result = vlp_bpt(folder, "render", "junk.vlp.npz", "-o", "a.exr", code=1)
     assert result.stderr.startswith("vlp-bpt: 'junk.vlp.npz': is not a VLP-BPT snapshot")
-    result = vlp_bpt(folder, *RENDER, "--device", "HYBRID", code=1)
-    assert result.stderr.startswith("vlp-bpt: device HYBRID")
+
+
+@pytest.mark.skipif(len(devices()) > 1, reason="there is a GPU")
+@pytest.mark.parametrize("device", ["CUDA", "HYBRID"])
+def test_without_a_gpu_the_cpu_renders_and_one_line_says_so(folder: Path, device: str) -> None:
+    result = vlp_bpt(folder, *RENDER, "--device", device)
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("vlp-bpt: warning: device CUDA: ")
+    assert line.endswith("; rendering on the CPU")
 
 
 def test_interrupting_keeps_the_picture(folder: Path) -> None:

@@ -126,7 +126,6 @@ def test_every_view_layer_is_told_of_and_warnings_come_once(folder: Path) -> Non
         (("render", "blind.blend", "-o", "x.png"), "'blind.blend': Cannot render, no camera"),
         (("export", "blind.blend", "-o", "x.vlp.npz"), "'blind.blend': Cannot render, no camera"),
         (("render", "junk.blend", "-o", "x.png"), "'junk.blend': Blender cannot open it: "),
-        (("render", "box.blend", "-o", "x.png", "--device", "HYBRID"), "'box.blend': device HYBRID"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )

@@ -1,0 +1,43 @@
+// Which iterations of a render are done, and which are to be done next (host only).
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+
+namespace vlp {
+
+// Devices that share a render take iterations in order and finish them in any. For one thread.
+class Iterations {
+public:
+    explicit Iterations(uint32_t first) : next_(first) {}
+
+    // The first one below `end` that nobody has taken.
+    std::optional<uint32_t> take(uint32_t end) {
+        if (!given_back_.empty() && *given_back_.begin() < end) return given_back_.extract(given_back_.begin()).value();
+        return next_ < end ? std::optional(next_++) : std::nullopt;
+    }
+    // Not done after all.
+    void give_back(uint32_t iteration) { given_back_.insert(iteration); }
+
+    void finish(uint32_t iteration) {
+        uint32_t begin = iteration, end = iteration + 1;
+        const auto after = finished_.lower_bound(iteration);
+        if (after != finished_.begin() && std::prev(after)->second == begin) begin = std::prev(after)->first;
+        if (after != finished_.end() && after->first == end) {
+            end = after->second;
+            finished_.erase(after);
+        }
+        finished_[begin] = end;
+    }
+    // Those that are done, [begin, end) by begin; neighbouring ranges are one.
+    const std::map<uint32_t, uint32_t>& finished() const { return finished_; }
+
+private:
+    uint32_t next_;
+    std::set<uint32_t> given_back_;
+    std::map<uint32_t, uint32_t> finished_;
+};
+
+}  // namespace vlp
