@@ -122,11 +122,12 @@ sanitize: .venv/.ready ## native tests under the address and undefined-behaviour
 	@cd native && export PATH=$(BIN):$$PATH && cmake --preset asan >/dev/null && cmake --build --preset asan && ctest --preset asan
 
 .PHONY: cuda-check
-cuda-check: .venv/.ready ## compile the CUDA code with the PyPI toolchain alone (no GPU needed)
-	@root=$$(.ci/cuda.sh); \
+cuda-check: .venv/.ready ## compile the CUDA code with the PyPI toolchain alone (no GPU needed), and what its kernels take
+	@rm -rf build/cuda; root=$$(.ci/cuda.sh); \
 	PATH=$(BIN):/usr/bin:/bin env -u CUDA_HOME -u CUDA_PATH -u LIBRARY_PATH bash -euo pipefail -c " \
-	  cmake -S native -B build/cuda -G Ninja -DVLP_PYTHON=OFF -DVLP_CUDA=ON -DVLP_CUDA_ROOT=$$root -DVLP_CUDA_ARCHITECTURES=90 -DVLP_WERROR=ON && \
-	  cmake --build build/cuda --target vlp_cuda"
+	  cmake -S native -B build/cuda -G Ninja -DVLP_PYTHON=OFF -DVLP_CUDA=ON -DVLP_CUDA_ROOT=$$root -DVLP_CUDA_ARCHITECTURES='75-real;90-real' -DVLP_CUDA_REPORT=ON -DVLP_WERROR=ON && \
+	  cmake --build build/cuda --target vlp_cuda -v >build/cuda/build.log 2>&1 || { cat build/cuda/build.log >&2; exit 1; }"
+	$(PY) .ci/kernel-resources.py build/cuda/build.log native/backend/kernels.md
 
 .PHONY: gpu-check
 gpu-check: ## build with CUDA and test, on a machine with a GPU and no package registry

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# gpu-check.sh: builds the package with CUDA and runs tests/gpu and the native tests, on a machine that has a GPU, nvcc, CMake, ninja, a C++
+# gpu-check.sh: builds the package with CUDA, runs tests/gpu and the native tests, and writes the benchmark's $OUT/gpu.json, on a machine that has a GPU, nvcc, CMake, ninja, a C++
 # compiler and a Python with nanobind, numpy and pytest, and that reaches no package registry. PYTHON and VLP_CUDA_ARCHITECTURES may be set.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -20,8 +20,13 @@ if [ "$tests" = ON ]; then
 else
   echo "vlp-bpt: LEFT OUT: the native tests, which need GoogleTest"
 fi
-if compgen -G 'tests/gpu/test_*.py' >/dev/null; then
-  "$python" -m pytest tests/gpu
+"$python" -m pytest tests/gpu -p no:cacheprovider
+if command -v compute-sanitizer >/dev/null; then
+  for tool in memcheck racecheck; do
+    compute-sanitizer --tool "$tool" --error-exitcode 1 "$python" -m pytest tests/gpu -p no:cacheprovider -k window_is_a_part
+  done
 else
-  echo "vlp-bpt: LEFT OUT: tests/gpu holds no test yet"
+  echo "vlp-bpt: LEFT OUT: compute-sanitizer, which is not installed"
 fi
+mkdir -p "${OUT:=$build}"
+"$python" tests/gpu/bench.py "$OUT" | tee "$OUT/gpu.md"

@@ -223,7 +223,7 @@ def _forget_reports(engine: Any, depsgraph: Any) -> None:
         _reported.clear()
 
 
-def _report(engine: Any, renderer: Any, notes: Notes) -> None:
+def _report(engine: Any, renderer: Any, notes: Any) -> None:
     """Reports each warning, the renderer's too, once in a picture or animation."""
     for warning in renderer.warnings:
         notes.warn(warning)

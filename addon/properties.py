@@ -41,7 +41,7 @@ FILTERS = (
 )
 
 DEVICES = (
-    ("AUTO", "Automatic", "The fastest device that this machine has"),
+    ("AUTO", "Automatic", "The fastest that is well tried: the processor, for now"),
     ("CPU", "CPU", "The processor alone"),
     ("CUDA", "GPU", "The NVIDIA graphics card alone"),
     ("HYBRID", "CPU and GPU", "Both together"),
@@ -67,7 +67,7 @@ def apply_mode(self: Any, context: Any) -> None:
 
 
 _DEFAULTS = {
-    "light_path_length": 8,
+    "light_path_length": 12,
     "eye_path_length": 16,
     "vlp_connections": 1,
     "vlp_candidates": 1,
@@ -112,7 +112,7 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
         default=_DEFAULTS["light_path_length"],
         min=0,
         max=64,
-        soft_max=8,
+        soft_max=16,
     )
     eye_path_length: bpy.props.IntProperty(
         name="Camera Bounces",
@@ -126,7 +126,7 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
     light_paths: bpy.props.IntProperty(
         name="Light Paths",
         description="How many paths start at the lamps in each sample (the paper's N). More give finer indirect light "
-        "and caustics, and take memory. Zero: one for every four pixels, or for every pixel in Paper mode",
+        "and caustics, and take memory. Zero: one for every eight pixels, or for every pixel in Paper mode",
         default=0,
         min=0,
         max=2**26,

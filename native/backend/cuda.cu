@@ -12,7 +12,8 @@ namespace vlp {
 namespace {
 
 constexpr uint32_t k_block_size = 128;
-constexpr uint32_t k_pixels_per_launch = 1u << 20;  // bounds how long a kernel runs before `stop` is looked at
+// Bound how long a kernel runs before `stop` is looked at.
+constexpr uint32_t k_pixels_per_launch = 1u << 18, k_paths_per_launch = 1u << 18;
 
 uint32_t blocks_for(uint32_t threads) { return (threads + k_block_size - 1) / k_block_size; }
 
@@ -22,10 +23,11 @@ struct AtomicAdd {
     }
 };
 
-__global__ void light_pass(SceneView scene, PassSettings pass, uint32_t iteration, Window window, LightVertex* slots,
-                           uint32_t* stored_in_path, ExactSum* splats, unsigned long long* dropped) {
-    const uint32_t path = blockIdx.x * blockDim.x + threadIdx.x;
-    if (path >= pass.light_paths) return;
+__global__ void light_pass(SceneView scene, PassSettings pass, uint32_t iteration, Window window, uint32_t first_path,
+                           uint32_t end_path, LightVertex* slots, uint32_t* stored_in_path, ExactSum* splats,
+                           unsigned long long* dropped) {
+    const uint32_t path = first_path + blockIdx.x * blockDim.x + threadIdx.x;
+    if (path >= end_path) return;
     LightVertex* own = slots + static_cast<size_t>(path) * pass.light_path_length;
     SplatSink<AtomicAdd> sink{pass, window, splats, {}};
     const LightPathCounts counts = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
@@ -90,7 +92,7 @@ public:
         counters.work_done = 0;
         counters.work_total = pixels;
         check_cuda(cudaMemset(dropped_.data(), 0, dropped_.bytes()), "clearing a counter");
-        const LightVertexCache cache = run_light_pass(iteration, window);
+        const LightVertexCache cache = run_light_pass(iteration, window, stop);
         for (uint32_t first = 0; first < pixels; first += k_pixels_per_launch) {
             if (stop) return false;
             const uint32_t end = std::min(pixels, first + k_pixels_per_launch);
@@ -116,13 +118,19 @@ public:
     size_t bytes() const override { return bytes_; }
 
 private:
-    LightVertexCache run_light_pass(uint32_t iteration, Window window) {
+    LightVertexCache run_light_pass(uint32_t iteration, Window window, const std::atomic<bool>& stop) {
         if (slots_.size() == 0) return {};
         const uint32_t paths = pass_.light_paths;
         check_cuda(cudaMemset(splats_.data(), 0, splats_.bytes()), "clearing the splats");
-        light_pass<<<blocks_for(paths), k_block_size>>>(scene_, pass_, iteration, window, slots_.data(),
-                                                        end_of_path_.data(), splats_.data(), dropped_.data());
-        check_cuda(cudaGetLastError(), "starting the light pass");
+        for (uint32_t first = 0; first < paths; first += k_paths_per_launch) {
+            if (stop) return {};
+            const uint32_t end = std::min(paths, first + k_paths_per_launch);
+            light_pass<<<blocks_for(end - first), k_block_size>>>(scene_, pass_, iteration, window, first, end,
+                                                                  slots_.data(), end_of_path_.data(), splats_.data(),
+                                                                  dropped_.data());
+            check_cuda(cudaGetLastError(), "starting the light pass");
+            check_cuda(cudaDeviceSynchronize(), "the light pass");
+        }
         if (!(pass_.kappa > 0)) return {};
         size_t scratch = scratch_.bytes();
         check_cuda(cub::DeviceScan::InclusiveSum(scratch_.data(), scratch, end_of_path_.data(), end_of_path_.data(),
@@ -154,6 +162,8 @@ std::unique_ptr<Backend> make_cuda_backend(const Scene& scene, const PassSetting
     int count = 0;
     check_cuda(cudaGetDeviceCount(&count), "no usable GPU");
     if (count == 0) throw std::runtime_error("device CUDA: there is no GPU");
+    // Waiting leaves the processor to others, such as the CPU back end of HYBRID.
+    check_cuda(cudaSetDeviceFlags(cudaDeviceScheduleBlockingSync), "choosing how to wait");
     return std::make_unique<CudaBackend>(scene, pass);
 }
 

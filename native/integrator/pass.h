@@ -37,7 +37,7 @@ struct PassSettings {
     VLP_HD float clamp_of(uint32_t n) const { return n <= 3 ? clamp_direct : clamp_indirect; }
 
     // Whether an iteration has a light pass.
-    bool traces_light() const { return kappa > 0 || splats; }
+    VLP_HD bool traces_light() const { return kappa > 0 || splats; }
 };
 
 // What one find adds to a pixel, made as dim as the settings ask: a bias against bright specks.

@@ -75,8 +75,8 @@ class Renderer:
 
     Raises SceneError or SettingsError for what cannot be rendered, DeviceError when the device fails. `first_iteration`
     begins a later range of the same render: ranges rendered apart merge to the picture that one render makes.
-    `warnings` are about the scene, and about devices that are not what was asked for, also once one fails during a render,
-    which then goes on without it. Calls may come from any thread; `iterate` and `read` wait for each other.
+    `warnings` are about the scene, and about devices that are not what was asked for, also once one fails during a
+    render, which then goes on without it. Calls may come from any thread; `iterate` and `read` wait for each other.
     """
 
     def __init__(self, scene: Scene, settings: RenderSettings | None = None, *, first_iteration: int = 0) -> None:

@@ -70,7 +70,7 @@ class ModePreset:
 
 MODE_PRESETS: dict[Mode, ModePreset] = {
     Mode.PAPER: ModePreset(1, 5, 1, 1, 1, False, False, Weighting.UNIFORM, 1, light_vertices=1 << 23),
-    Mode.BALANCED: ModePreset(8, 16, 1, 1, 1, True, True, Weighting.BALANCE, 4, light_vertices=1 << 23),
+    Mode.BALANCED: ModePreset(12, 16, 1, 1, 1, True, True, Weighting.BALANCE, 8, light_vertices=1 << 23),
     Mode.REFERENCE: ModePreset(64, 64, 1, 1, 1, True, True, Weighting.BALANCE, 4, light_vertices=1 << 21),
 }
 

@@ -114,8 +114,6 @@ def test_lamps_are_as_bright_as_in_cycles(name: str, compare: Any) -> None:
     shown = scenes.light(kind, **settings)
     shown.rotation_euler = (0.2, 0.1, 0)
     shown.scale = (1.5, 1.5, 1.5)
-    if name in ("spot", "soft spot", "narrow area"):  # whose light paths crowd in a part of the picture
-        bpy.context.scene.vlp_bpt.samples = 6144
     compare()
 
 

@@ -139,8 +139,8 @@ def bench_scene(path: Path, args: argparse.Namespace) -> list[Row]:
 
 
 def entries(path: Path, scene: Scene, args: argparse.Namespace) -> list[Contestant]:
-    """Who takes part. Path tracing alone is BALANCED without light paths. Cycles gets the same eye path length, and both
-    end walks by roulette; point clouds come a second time as meshes, since inside glass Cycles' points are not spheres.
+    """Who takes part. Path tracing alone is BALANCED without light paths. Cycles has its eye path length, and both end
+    walks by roulette. Point clouds come a second time as meshes: inside glass Cycles' points are not spheres.
     """
     common: dict[str, Any] = {"samples": 1 << 30, "threads": args.threads}
     longest = MODE_PRESETS[Mode.BALANCED].eye_path_length

@@ -1,0 +1,87 @@
+"""bench.py OUT: what the device makes in a second and how soon pictures are good, as OUT/gpu.json and a table.
+
+Iterations a second of each scene and mode at 512 x 512; in PAPER mode also the seconds to the SSIM that the paper gives
+(Celestino et al. 2014, 5.1), against a long render of the same window: SSIM of sRGB-encoded, clipped pictures.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from on_device import DEVICE, SCENES, load
+
+from vlp_bpt import Renderer, RenderSettings, devices, metrics
+from vlp_bpt.scene import Film
+
+SECONDS = 3.0
+MARKS = {"cornell_box": (0.90, 0.97, 0.998), "sierpinski": (0.93, 0.97, 0.998)}
+
+
+def timed(name: str, mode: str, device: str = DEVICE, seconds: float = SECONDS, seed: int = 0) -> Renderer:
+    """Rendered for `seconds`, without the first iterations, which warm up."""
+    settings = {"samples": 1 << 30, "device": device, "mode": mode, "seed": seed}
+    renderer = Renderer(load(name, Film(512, 512)), RenderSettings.from_dict(settings))
+    renderer.iterate(2)
+    end, chunk = time.perf_counter() + seconds, 1
+    while time.perf_counter() < end:
+        started = time.perf_counter()
+        renderer.iterate(chunk)
+        chunk = max(1, min(2 * chunk, int(0.2 * chunk / (time.perf_counter() - started))))
+    return renderer
+
+
+def seconds_to_ssim(name: str, marks: tuple[float, ...]) -> dict[str, float | None]:
+    """By renders of 1, 2, 4, ... iterations, between which the logarithms are interpolated; None where not reached."""
+    reference = timed(name, "PAPER", seconds=6 * SECONDS, seed=1).read()[..., :3]
+    found: list[tuple[float, float]] = []
+    renderer = timed(name, "PAPER", seconds=0.1)
+    for count in (2**i for i in range(20)):
+        renderer = Renderer(
+            load(name, Film(512, 512)), RenderSettings.from_dict({"samples": count, "device": DEVICE, "mode": "PAPER"})
+        )
+        started = time.perf_counter()
+        renderer.iterate(count)
+        seconds = time.perf_counter() - started
+        found.append((metrics.ssim(renderer.read()[..., :3], reference), seconds))
+        if found[-1][0] > marks[-1] or seconds > 2 * SECONDS:
+            break
+    ssims, times = np.array(found).T
+    return {
+        str(mark): float(np.exp(np.interp(mark, ssims, np.log(times)))) if ssims.max() >= mark else None
+        for mark in marks
+    }
+
+
+def main(out: str) -> None:
+    modes = ("PAPER", "BALANCED", "REFERENCE")
+    rows: list[dict[str, Any]] = []
+    for name in SCENES:
+        for mode in modes:
+            for device in dict.fromkeys((DEVICE, "HYBRID", "CPU")):
+                if device == "HYBRID" and DEVICE == "CPU":
+                    continue
+                taken = timed(name, mode, device).statistics
+                rates = {
+                    "iterations_per_second": taken.iterations / taken.seconds,
+                    "eye_samples_per_second": taken.eye_samples_per_second,
+                }
+                rows.append({"scene": name, "mode": mode, "device": device, **rates, "memory": taken.memory})
+    ssim = {name: seconds_to_ssim(name, marks) for name, marks in MARKS.items()}
+    report = {"devices": devices(), "rates": rows, "seconds_to_ssim": ssim}
+    (Path(out) / "gpu.json").write_text(json.dumps(report, indent=1))
+    print("| scene | mode | device | iterations/s | M eye samples/s |\n|---|---|---|---|---|")
+    for row in rows:
+        rates = f"{row['iterations_per_second']:.1f} | {row['eye_samples_per_second'] / 1e6:.2f}"
+        print(f"| {row['scene']} | {row['mode']} | {row['device']} | {rates} |")
+    print("\n| scene | seconds to SSIM |\n|---|---|")
+    for name, found in ssim.items():
+        print(f"| {name} | {', '.join(f'{mark}: {seconds}' for mark, seconds in found.items())} |")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,111 @@
+"""The GPU makes the pictures that the CPU makes: of the same random numbers, so nearly the same in every pixel."""
+
+from __future__ import annotations
+
+import time
+from threading import Timer
+
+import numpy as np
+import pytest
+from on_device import DEVICE, SCENES, load, picture, renderer
+
+from vlp_bpt import Renderer, RenderSettings, devices
+from vlp_bpt.scene import Film
+
+MODES = ("PAPER", "BALANCED", "REFERENCE")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _there_is_such_a_device() -> None:
+    assert any(device["kind"] == DEVICE for device in devices()), f"there is no device {DEVICE} here"
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("mode", MODES)
+def test_paths_are_those_of_the_cpu(name: str, mode: str) -> None:
+    """Arithmetic differs in the last bits, and now and then a path turns off at an edge: few pixels differ."""
+    scene = load(name)
+    ours, theirs = (picture(scene, device, 2, mode=mode) for device in (DEVICE, "CPU"))
+    size = np.maximum(np.abs(theirs), 1e-2 * theirs.mean())
+    differs = (np.abs(ours - theirs) > 1e-3 * size).any(axis=-1)
+    assert differs.mean() < 0.03
+    np.testing.assert_allclose(np.median(ours - theirs), 0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("mode", MODES)
+def test_means_are_those_of_the_cpu(name: str, mode: str) -> None:
+    """z-test of the mean over 12 batches with seeds of their own each; a false alarm has a probability of 1e-6."""
+    scene = load(name)
+    ours, theirs = (
+        np.array([picture(scene, device, 16, mode=mode, seed=seed + offset).mean() for seed in range(12)])
+        for device, offset in ((DEVICE, 1), ("CPU", 101))
+    )
+    error = np.sqrt((ours.var(ddof=1) + theirs.var(ddof=1)) / 12)
+    assert abs(ours.mean() - theirs.mean()) < 6.5 * error  # t with about 22 degrees of freedom
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_same_seed_makes_the_same_bits(mode: str) -> None:
+    scene = load("cornell_box")
+    first, second = (renderer(scene, mode=mode).film_state() for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_a_window_is_a_part_of_the_whole() -> None:
+    whole = renderer(load("cornell_box"), splats=False).read()
+    part = renderer(load("cornell_box", Film(48, 48, (5, 7, 20, 11))), splats=False).read()
+    np.testing.assert_array_equal(part, whole[7:18, 5:25])
+
+
+def test_ranges_add_up_to_the_whole() -> None:
+    scene = load("indirect_room")
+    whole = renderer(scene, iterations=6)
+    first = renderer(scene, iterations=2)
+    rest = Renderer(scene, RenderSettings(samples=4, device=DEVICE, filter="BOX"), first_iteration=2)  # type: ignore[arg-type]
+    rest.iterate(4)
+    first.add_film_state(rest.film_state(), 4)
+    np.testing.assert_array_equal(first.film_state(), whole.film_state())
+
+
+def test_both_devices_together_make_the_same_iterations() -> None:
+    """What the CPU made differs in the last bits, and a few paths in more."""
+    if DEVICE == "CPU":
+        pytest.skip("needs a GPU")
+    scene = load("cornell_box")
+    both, alone = (renderer(scene, device, 64) for device in ("HYBRID", DEVICE))
+    assert both.metadata()["ranges"] == [[0, 64]]
+    np.testing.assert_allclose(both.read()[..., :3].mean(), alone.read()[..., :3].mean(), rtol=1e-3)
+
+
+def test_memory_that_cannot_be_had_is_named_and_the_cpu_renders(monkeypatch: pytest.MonkeyPatch) -> None:
+    if DEVICE == "CPU":
+        pytest.skip("needs a GPU")
+    scene = load("cornell_box")
+    for limit, what in ((1000, "the scene"), (200_000, "")):
+        monkeypatch.setenv("VLP_BPT_GPU_MEMORY", str(limit))
+        made = Renderer(scene, RenderSettings(samples=2, device="CUDA", light_paths=100_000))  # type: ignore[arg-type]
+        (warning,) = made.warnings
+        assert "device CUDA: allocating " in warning
+        assert f" bytes for {what}" in warning
+        assert warning.endswith("out of memory; rendering on the CPU")
+        assert made.iterate(2) == 2
+    monkeypatch.delenv("VLP_BPT_GPU_MEMORY")
+    assert not Renderer(scene, RenderSettings(samples=2, device="CUDA")).warnings  # type: ignore[arg-type]
+
+
+def test_it_stops_at_once() -> None:
+    """Within 50 ms of being told to, and 50 ms for the thread that asks."""
+    scene = load("indirect_room", Film(1024, 1024))
+    made = Renderer(scene, RenderSettings(samples=1 << 20, device=DEVICE))  # type: ignore[arg-type]
+    told: list[float] = []
+
+    def stop() -> None:
+        told.append(time.perf_counter())
+        made.cancel()
+
+    Timer(1.0, stop).start()
+    made.iterate(1 << 20)
+    latency = time.perf_counter() - told[0]
+    print(f"stopped after {1e3 * latency:.1f} ms")
+    assert latency < 0.1
