@@ -68,11 +68,9 @@ def test_reference_traces_at_most_32768_light_paths() -> None:
     assert RenderSettings(mode=Mode.REFERENCE).resolved(512, 512).light_paths == 32768
 
 
-@pytest.mark.parametrize("mode", list(Mode))
-def test_automatic_light_paths_without_light_path_length(mode: Mode) -> None:
-    assert RenderSettings(mode=mode, light_path_length=0).resolved(8, 8).light_paths == (
-        64 if mode is Mode.PAPER else 16
-    )
+@pytest.mark.parametrize(("mode", "expected"), [(Mode.PAPER, 64), (Mode.BALANCED, 8), (Mode.REFERENCE, 16)])
+def test_automatic_light_paths_without_light_path_length(mode: Mode, expected: int) -> None:
+    assert RenderSettings(mode=mode, light_path_length=0).resolved(8, 8).light_paths == expected
 
 
 @pytest.mark.parametrize(
