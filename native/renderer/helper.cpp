@@ -60,10 +60,15 @@ void Helper::wait(const std::atomic<bool>& stop) {
     while (state_ == State::started && !stop) changed_.wait_for(lock, std::chrono::milliseconds(5));
 }
 
-std::optional<uint32_t> Helper::abandon() {
+void Helper::halt() {
     stop_ = true;
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return state_ != State::started; });
+}
+
+std::optional<uint32_t> Helper::abandon() {
+    halt();
+    const std::lock_guard lock(mutex_);
     state_ = State::idle;
     error_ = nullptr;
     film_.clear();
@@ -80,11 +85,12 @@ void Helper::work() {
     for (;;) {
         changed_.wait(lock, [this] { return state_ == State::started || state_ == State::ending; });
         if (state_ == State::ending) return;
+        const uint32_t iteration = iteration_.value();
         lock.unlock();
         State outcome = State::failed;
         std::exception_ptr error;
         try {
-            outcome = backend_->run_iteration(*iteration_, film_, stop_) ? State::finished : State::stopped;
+            outcome = backend_->run_iteration(iteration, film_, stop_) ? State::finished : State::stopped;
         } catch (...) {
             error = std::current_exception();
         }

@@ -27,7 +27,9 @@ public:
     std::optional<uint32_t> collect(Film& film);
     // Waits until the iteration is finished or `stop` is set.
     void wait(const std::atomic<bool>& stop);
-    // Throws away the iteration under way, if any, and returns which.
+    // Makes the iteration under way end, finished or not.
+    void halt();
+    // Throws away the iteration that it has, if any, and returns which.
     std::optional<uint32_t> abandon();
 
     double seconds_left() const;  // of the iteration under way, as far as the last one tells; infinite before the first

@@ -94,7 +94,7 @@ bool Renderer::run_one() {
             helper_->wait(stop_);
             return false;
         }
-        if (const auto undone = helper_->abandon()) iterations_.give_back(*undone);
+        if (rest() > 0) return true;
         own = iterations_.take(end_);
     }
     if (!own) own = iterations_.take(k_none);
@@ -130,8 +130,9 @@ void Renderer::go_on_without_main(const char* reason) {
 }
 
 uint32_t Renderer::rest() {
-    const uint32_t collected = collect_from_helper() ? 1 : 0;
     if (!helper_) return 0;
+    helper_->halt();
+    const uint32_t collected = collect_from_helper() ? 1 : 0;
     if (const auto undone = helper_->abandon()) iterations_.give_back(*undone);
     return collected;
 }
