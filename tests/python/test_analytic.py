@@ -193,6 +193,18 @@ def test_white_bodies_vanish_under_a_white_sky(shape: Mesh | Spheres, matrix: An
     assert_mean(blocks(batches(scene, options, 12), 6), 1.0, "all strategies", rounding=1e-4)
 
 
+@pytest.mark.parametrize("share", [0.25, 0.7])
+def test_veils_vanish_under_a_white_sky(share: float) -> None:
+    """Half transparent and half white bodies: what passes and what is scattered make up for each other's chances."""
+    veil = materials.mix(materials.transparent(), grey(1.0), 1 - share)
+    scene = Builder(12, looking((1, -3, 1.5), (0, 0, 0), 0.45)).add(sphere(), veil).add(cube(), veil).scene
+    scene.world = World(radiance=(1, 1, 1))
+    by_hits = render(scene, settings(samples=8, light_path_length=0, eye_path_length=64, **HITS_ONLY))
+    np.testing.assert_allclose(by_hits, 1.0, rtol=1e-4)
+    options = settings(samples=64, light_path_length=2, eye_path_length=64, light_samples=2, vlp_connections=2)
+    assert_mean(blocks(batches(scene, options, 12), 6), 1.0, "all strategies", rounding=2e-4)
+
+
 def test_clear_bodies_vanish_under_a_white_sky() -> None:
     """Glass reflects and refracts, but takes nothing; what is left inside after 64 hits is below 1e-4."""
     builder = Builder(12, looking((1, -3, 1.5), (0, 0, 0), 0.45))
