@@ -84,8 +84,8 @@ void Helper::work() {
     std::unique_lock lock(mutex_);
     for (;;) {
         changed_.wait(lock, [this] { return state_ == State::started || state_ == State::ending; });
-        if (state_ == State::ending || !iteration_) return;
-        const uint32_t iteration = *iteration_;
+        if (state_ == State::ending) return;
+        const uint32_t iteration = iteration_.value_or(0);  // there is one once it is started
         lock.unlock();
         State outcome = State::failed;
         std::exception_ptr error;
