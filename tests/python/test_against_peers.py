@@ -64,7 +64,7 @@ CASES = [
     Case("thousand_lights", iterations=128, cycles=64, mitsuba=128),
     Case("sun_and_glass", iterations=256, cycles=64, mitsuba=128, joined=2),
     Case("sky", iterations=32, cycles=32, mitsuba=32),
-    Case("depth_of_field", iterations=64, cycles=192, mitsuba=256),
+    Case("depth_of_field", iterations=96, cycles=192, mitsuba=320),
     Case("scaled_emitters", iterations=128, cycles=64, mitsuba=256),
     Case("glass_window", iterations=192, cycles=256, mitsuba=256, our_batches=40),
 ]
