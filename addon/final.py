@@ -11,12 +11,15 @@ import json
 import threading
 import time
 import traceback
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
 
 from . import core, figures
+
+if TYPE_CHECKING:
+    from .export.notes import Notes
 
 # Showing the picture costs up to a second at 4K: this share of the time at most goes into it.
 SHARE_OF_SHOWING = 0.1
@@ -223,7 +226,7 @@ def _forget_reports(engine: Any, depsgraph: Any) -> None:
         _reported.clear()
 
 
-def _report(engine: Any, renderer: Any, notes: Any) -> None:
+def _report(engine: Any, renderer: Any, notes: Notes) -> None:
     """Reports each warning, the renderer's too, once in a picture or animation."""
     for warning in renderer.warnings:
         notes.warn(warning)

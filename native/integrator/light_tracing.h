@@ -96,7 +96,7 @@ VLP_HD inline LightPathCounts trace_light_path(const SceneView& scene, const Pas
 
         // The next ray of Listing 2, off any kind of surface.
         const Bsdf bsdf = make_bsdf(scene, y);
-        sampler.dimension = 3 * i;
+        sampler.dimension = 3 * i;  // three a step, as at the light: direction, lobe, roulette
         const Vec2 u = sampler.next_2d();
         const float u_lobe = bsdf.is_diffuse() ? 0.0f : sampler.next();
         const BsdfSample next = sample(bsdf, -ray.direction, Walk::light, u_lobe, u);

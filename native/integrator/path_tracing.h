@@ -7,8 +7,8 @@
 
 namespace vlp {
 
-// Roulette spares eye walks that still carry this share of what they began with: an eye walk that goes on has a light sample and
-// a connection at each vertex, worth more than what ending it early saves.
+// Roulette spares eye walks that still carry this share of what they began with: a walk that goes on has a light sample
+// and a connection at each vertex, worth more than what ending it early saves.
 inline constexpr float k_spared_throughput = 2.0f / 3.0f;
 
 // The radiance that one path through pixel (x, y) of the full picture finds, y counted from the bottom. Each strategy's
@@ -28,8 +28,10 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
     PrimitiveId skip{};
     Anchor from{ray.origin - ray.direction * distance_from_lens(scene.camera, ray), {}, {}};
     const bool has_vlps = pass.kappa > 0 && cache.stored_count > 0 && pass.vlp_connections > 0;
-    // Every step draws from dimensions of its own, so that a path's later draws do not shift with its earlier ones.
-    const uint32_t draws_per_step = 2 * pass.light_samples + 2 * pass.vlp_connections + 3;
+    // Every step draws from dimensions of its own, so that a path's later draws do not shift with its earlier ones: two for
+    // each light sample and connection, then direction, lobe and roulette.
+    const uint32_t next_ray_draws = 2 * (pass.light_samples + pass.vlp_connections),
+                   draws_per_step = next_ray_draws + 3;
 
     for (uint32_t hits = 1; hits <= pass.eye_path_length; ++hits) {
         const uint32_t first_draw = 2 + (hits - 1) * draws_per_step;
@@ -92,7 +94,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         }
         if (hits == pass.eye_path_length) break;
 
-        sampler.dimension = first_draw + draws_per_step - 3;
+        sampler.dimension = first_draw + next_ray_draws;
         const Vec2 u_direction = sampler.next_2d();
         const float u_lobe = bsdf.is_diffuse() ? 0.0f : sampler.next();
         const BsdfSample next = sample(bsdf, eye.w_eye, Walk::eye, u_lobe, u_direction);
@@ -100,7 +102,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         eye.throughput *= next.weight;
         if (pass.roulette) {
             const float survive = min_of(1.0f, max_component(eye.throughput) / k_spared_throughput);
-            sampler.dimension = first_draw + draws_per_step - 1;
+            sampler.dimension = first_draw + next_ray_draws + 2;
             if (survive < 1 && sampler.next() >= survive) break;
             eye.throughput *= 1.0f / survive;
         }

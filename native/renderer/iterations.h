@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <set>
 
 namespace vlp {
 
-// Devices that share a render take iterations in order and finish them in any. For one thread.
+// Devices that share a render take iterations in order and finish them in any. For one thread, but for `finished`, which
+// any may ask.
 class Iterations {
 public:
     explicit Iterations(uint32_t first) : next_(first) {}
@@ -22,6 +24,7 @@ public:
     void give_back(uint32_t iteration) { given_back_.insert(iteration); }
 
     void finish(uint32_t iteration) {
+        const std::lock_guard lock(mutex_);
         uint32_t begin = iteration, end = iteration + 1;
         const auto after = finished_.lower_bound(iteration);
         if (after != finished_.begin() && std::prev(after)->second == begin) begin = std::prev(after)->first;
@@ -32,11 +35,15 @@ public:
         finished_[begin] = end;
     }
     // Those that are done, [begin, end) by begin; neighbouring ranges are one.
-    const std::map<uint32_t, uint32_t>& finished() const { return finished_; }
+    std::map<uint32_t, uint32_t> finished() const {
+        const std::lock_guard lock(mutex_);
+        return finished_;
+    }
 
 private:
     uint32_t next_;
     std::set<uint32_t> given_back_;
+    mutable std::mutex mutex_;  // of finished_
     std::map<uint32_t, uint32_t> finished_;
 };
 

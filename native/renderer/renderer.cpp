@@ -43,10 +43,11 @@ Devices make_devices(const std::string& device, const Scene& scene, const PassSe
             devices.notes.push_back(std::string(error.what()) + "; rendering on the CPU");
         }
     }
-    auto& place = devices.main ? devices.helper : devices.main;
     const auto cpu = [&scene, pass, threads] { return make_cpu_backend(scene, pass, threads); };
-    if (device != "CUDA" || !devices.main) {
-        place = cpu();
+    if (!devices.main) {
+        devices.main = cpu();
+    } else if (device == "HYBRID") {
+        devices.helper = cpu();
     } else {
         devices.spare = cpu;
     }
@@ -122,7 +123,10 @@ bool Renderer::run_one() {
 
 // Nothing is lost: the film holds complete iterations.
 void Renderer::go_on_without_main(const char* reason) {
-    instead_of_main_ = helper_ ? helper_->release() : spare_();
+    std::unique_ptr<Backend> cpu = helper_ ? nullptr : spare_();
+    const std::lock_guard lock(mutex_);
+    if (helper_) cpu = helper_->release();
+    instead_of_main_ = std::move(cpu);
     active_ = instead_of_main_.get();
     helper_.reset();
     spare_ = nullptr;
@@ -144,13 +148,22 @@ void Renderer::set_deadline(double seconds) {
                     : Clock::time_point::max();
 }
 
+std::vector<std::string> Renderer::notes() const {
+    const std::lock_guard lock(mutex_);
+    return notes_;
+}
+
 uint64_t Renderer::dropped() const {
+    const std::lock_guard lock(mutex_);
     uint64_t sum = main_->counters.dropped;
     if (instead_of_main_) sum += instead_of_main_->counters.dropped;
     return helper_ ? sum + helper_->backend().counters.dropped : sum;
 }
 
-size_t Renderer::backend_bytes() const { return active_.load()->bytes() + (helper_ ? helper_->backend().bytes() : 0); }
+size_t Renderer::backend_bytes() const {
+    const std::lock_guard lock(mutex_);
+    return active_.load()->bytes() + (helper_ ? helper_->backend().bytes() : 0);
+}
 
 float Renderer::progress() const {
     const BackendCounters& c = active_.load()->counters;

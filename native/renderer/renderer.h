@@ -5,6 +5,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -53,7 +54,7 @@ public:
     const Iterations& iterations() const { return iterations_; }
     size_t backend_bytes() const;
     // What the user should hear about the devices: why one was left out.
-    const std::vector<std::string>& notes() const { return notes_; }
+    std::vector<std::string> notes() const;
 
 private:
     bool collect_from_helper();
@@ -63,6 +64,7 @@ private:
     std::shared_ptr<const Scene> scene_;
     PassSettings pass_;
     Film film_;
+    mutable std::mutex mutex_;  // of which devices there are, and of notes_, for those who ask while `iterate` runs
     std::unique_ptr<Backend> main_, instead_of_main_;  // the latter once the former has failed
     std::atomic<Backend*> active_;  // the one of these that renders
     std::unique_ptr<Helper> helper_;

@@ -61,7 +61,7 @@ struct Pair {
         renderer = std::make_unique<Renderer>(nullptr, PassSettings{}, k_window,
                                               Devices{std::move(a), std::move(b), {}, {}}, 0, end);
     }
-    const Ranges& done() const { return renderer->iterations().finished(); }
+    Ranges done() const { return renderer->iterations().finished(); }
     double sum() const { return renderer->film().sums()[0].value(); }
 };
 
@@ -176,6 +176,27 @@ TEST(TwoDevices, MakeThePictureOfOne) {
     const auto a = one.film().sums(), b = two.film().sums();
     EXPECT_GT(a[4 * (12 * 24 + 12)].value(), 0);
     EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size_bytes()), 0);
+}
+
+// As a progress display does; a sanitizer for threads has something to find here.
+TEST(TwoDevices, CanBeAskedWhileTheyRender) {
+    Pair pair(1ms, 1ms, 60, 30);
+    std::atomic<bool> over{false};
+    std::thread other([&] {
+        while (!over) {
+            uint32_t done = 0;
+            for (const auto& [begin, end] : pair.done()) done += end - begin;
+            EXPECT_LE(done, 60u);
+            EXPECT_LE(pair.renderer->notes().size(), 1u);
+            EXPECT_LE(pair.renderer->backend_bytes(), 16u);
+            EXPECT_LE(pair.renderer->dropped(), 60u);
+            EXPECT_LE(pair.renderer->progress(), 1);
+        }
+    });
+    EXPECT_EQ(pair.renderer->iterate(60), 60u);
+    over = true;
+    other.join();
+    EXPECT_EQ(pair.sum(), std::ldexp(1.0, 60) - 1);
 }
 
 TEST(OneDevice, ASpareTakesOverWhenItFails) {
