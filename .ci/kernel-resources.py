@@ -1,7 +1,7 @@
 """kernel-resources.py LOG LIMITS: what ptxas -v says of each kernel, as a table; fails where one takes too much.
 
 LIMITS is a Markdown table with the columns kernel, architecture, registers, stack, spill stores, spill loads (bytes); a
-kernel that is missing there fails too. With --write the table is written to LIMITS instead.
+kernel that is missing there fails too, as does one that the log does not tell of. With --write the table is written to LIMITS instead.
 """
 
 from __future__ import annotations
@@ -59,6 +59,7 @@ def main(log: str, limits: str, *options: str) -> int:
         for name, value, most in zip(HEAD[2:], values, allowed.get((kernel, architecture), (-1,) * 4), strict=True)
         if value > most
     ]
+    worse += [f"{kernel} on {architecture} was not compiled" for kernel, architecture in allowed.keys() - found.keys()]
     for line in worse:
         print(f"kernel-resources: {line}", file=sys.stderr)
     return 1 if worse else 0

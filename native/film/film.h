@@ -34,7 +34,7 @@ public:
     // Adds rows [begin, end) of the frame, and of the splats, to the sums.
     void commit_rows(uint32_t begin, uint32_t end);
     void count_iteration() { ++iterations_; }
-    // As when it was made.
+    // Forgets all iterations.
     void clear();
 
     uint64_t iterations() const { return iterations_; }
