@@ -1,7 +1,7 @@
 """kernel-resources.py LOG LIMITS: what ptxas -v says of each kernel, as a table; fails where one takes too much.
 
-LIMITS is a Markdown table with the columns kernel, architecture, registers, stack, spill stores, spill loads (bytes); a
-kernel that is missing there fails too, as does one that the log does not tell of. With --write the table is written to LIMITS instead.
+LIMITS is a Markdown table with the columns kernel, architecture, registers, stack, spill stores, spill loads (bytes).
+Kernels that stand in one of LOG and LIMITS alone fail too. With --write the table is written to LIMITS instead.
 """
 
 from __future__ import annotations
