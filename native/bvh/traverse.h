@@ -28,10 +28,12 @@ VLP_HD inline float intersect_lane(const TraversalRay& ray, const SphereBlock& b
 // Asks for the memory of a child that will soon be visited, while others are still in work.
 VLP_HD VLP_FORCE_INLINE void prefetch([[maybe_unused]] const BvhView& bvh, [[maybe_unused]] uint32_t child) {
 #if !VLP_ON_DEVICE
-    const uint32_t index = child_index(child);
-    const char* const first = child_kind(child) == ChildKind::node
-                                  ? reinterpret_cast<const char*>(bvh.nodes + index)
-                                  : reinterpret_cast<const char*>(bvh.triangle_blocks + index);
+    // Without a branch, which would be mispredicted; spheres and instances are few and not worth it.
+    const uint64_t at_leaf = child_kind(child) == ChildKind::node ? 0 : ~uint64_t{0};
+    const auto nodes = reinterpret_cast<uint64_t>(bvh.nodes), blocks = reinterpret_cast<uint64_t>(bvh.triangle_blocks);
+    const uint64_t base = nodes ^ ((nodes ^ blocks) & at_leaf);
+    const uint64_t size = sizeof(BvhNode) ^ ((sizeof(BvhNode) ^ sizeof(TriangleBlock)) & at_leaf);
+    const auto* const first = reinterpret_cast<const char*>(base + child_index(child) * size);
     __builtin_prefetch(first);
     __builtin_prefetch(first + 64);
     __builtin_prefetch(first + 128);
