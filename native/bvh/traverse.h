@@ -6,6 +6,16 @@
 
 namespace vlp {
 
+// Steps through nodes and blocks, counted only in the ray benchmark's second build: counting takes time.
+#if VLP_COUNT_VISITS
+inline thread_local uint64_t visited_nodes, visited_blocks;
+VLP_HD inline void count_node() { ++visited_nodes; }
+VLP_HD inline void count_block() { ++visited_blocks; }
+#else
+VLP_HD inline void count_node() {}
+VLP_HD inline void count_block() {}
+#endif
+
 namespace detail {
 
 VLP_HD inline bool is(PrimitiveId id, uint32_t instance, uint32_t primitive) {
@@ -84,6 +94,7 @@ VLP_HD inline void closest_in_tree(const SceneView& scene, const Ray& world_ray,
     for (;;) {
         bool at_leaf = true;
         while (child_kind(child) == ChildKind::node) {
+            count_node();
             const BvhNode& node = bvh.nodes[child];
             alignas(32) float entry[k_node_width];
             const uint32_t mask = meet_children(ray, node, hit.t, entry);
@@ -98,6 +109,7 @@ VLP_HD inline void closest_in_tree(const SceneView& scene, const Ray& world_ray,
             const uint32_t index = child_index(child), end = index + child_blocks(child);
             if (child_kind(child) == ChildKind::triangles) {
                 for (uint32_t b = index; b < end; ++b) {
+                    count_block();
                     const TriangleBlock& block = bvh.triangle_blocks[b];
                     BlockHits hits;
                     for (uint32_t mask = intersect_block(ray, block, hit.t, hits); mask != 0; mask &= mask - 1) {
@@ -109,6 +121,7 @@ VLP_HD inline void closest_in_tree(const SceneView& scene, const Ray& world_ray,
                 }
             } else if (child_kind(child) == ChildKind::spheres) {
                 for (uint32_t b = index; b < end; ++b) {
+                    count_block();
                     const SphereBlock& block = bvh.sphere_blocks[b];
                     for (uint32_t i = 0; i < k_block_width; ++i) {
                         const uint32_t owner = in_world ? block.instance[i] : instance;
@@ -141,6 +154,7 @@ VLP_HD inline bool any_in_tree(const SceneView& scene, const Ray& world_ray, con
     for (;;) {
         bool at_leaf = true;
         while (child_kind(child) == ChildKind::node) {
+            count_node();
             const BvhNode& node = bvh.nodes[child];
             alignas(32) float entry[k_node_width];
             uint32_t mask = meet_children(ray, node, world_ray.t_max, entry);
@@ -159,6 +173,7 @@ VLP_HD inline bool any_in_tree(const SceneView& scene, const Ray& world_ray, con
             const uint32_t index = child_index(child), end = index + child_blocks(child);
             if (child_kind(child) == ChildKind::triangles) {
                 for (uint32_t b = index; b < end; ++b) {
+                    count_block();
                     const TriangleBlock& block = bvh.triangle_blocks[b];
                     BlockHits hits;
                     for (uint32_t mask = intersect_block(ray, block, world_ray.t_max, hits); mask != 0;
@@ -171,6 +186,7 @@ VLP_HD inline bool any_in_tree(const SceneView& scene, const Ray& world_ray, con
                 }
             } else if (child_kind(child) == ChildKind::spheres) {
                 for (uint32_t b = index; b < end; ++b) {
+                    count_block();
                     const SphereBlock& block = bvh.sphere_blocks[b];
                     for (uint32_t i = 0; i < k_block_width; ++i) {
                         const uint32_t owner = in_world ? block.instance[i] : instance;
