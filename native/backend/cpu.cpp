@@ -5,8 +5,8 @@
 
 #include "backend/backend.h"
 #include "core/parallel.h"
+#include "integrator/guides.h"
 #include "integrator/light_tracing.h"
-#include "integrator/path_tracing.h"
 #include "scene/scene.h"
 
 namespace vlp {
@@ -123,7 +123,7 @@ private:
         pool_.run(static_cast<uint32_t>(vertices_in_piece_.size()), [&](uint32_t piece) {
             if (stop) return;
             LightVertex path_alone[k_max_walk];
-            SplatSink<AtomicAdd> sink{pass_, film.window(), film.splats().data(), {}};
+            SplatSink<AtomicAdd> sink{pass_, film.window(), film.splats().data(), film.point_splats().data(), {}};
             uint32_t vertices = 0, stored = 0;
             const uint32_t end = std::min((piece + 1) * k_paths_per_piece, pass_.light_paths);
             for (uint32_t path = piece * k_paths_per_piece; path < end; ++path) {
@@ -159,11 +159,22 @@ private:
         uint64_t dropped = 0;
         for (uint32_t y = tile.y * k_tile; y < y_end; ++y) {
             for (uint32_t x = tile.x * k_tile; x < x_end; ++x) {
-                PixelSink sink{pass_};
-                const float alpha = trace_eye_path(scene_, pass_, cache, iteration, window.x + x, window.y + y, sink);
-                dropped += sink.dropped;
-                const Rgb c = sink.radiance;
-                film.frame()[static_cast<size_t>(y) * window.width + x] = {{c.r, c.g, c.b, alpha}};
+                const size_t pixel = static_cast<size_t>(y) * window.width + x;
+                const auto trace = [&](auto& sink) {
+                    const float alpha =
+                        trace_eye_path(scene_, pass_, cache, iteration, window.x + x, window.y + y, sink);
+                    dropped += sink.dropped;
+                    const Rgb c = sink.radiance;
+                    film.frame()[pixel] = {{c.r, c.g, c.b, alpha}};
+                };
+                if (film.has_guides()) {
+                    GuidedSink sink(pass_, scene_);
+                    trace(sink);
+                    film.guide_frame()[pixel] = sink.guide();
+                } else {
+                    PixelSink sink{pass_};
+                    trace(sink);
+                }
             }
         }
         count_dropped(dropped);
