@@ -4,9 +4,10 @@
 #include <numeric>
 
 #include "backend/backend.h"
+#include "backend/guided_pixel.h"
 #include "core/parallel.h"
-#include "integrator/guides.h"
 #include "integrator/light_tracing.h"
+#include "integrator/path_tracing.h"
 #include "scene/scene.h"
 
 namespace vlp {
@@ -159,22 +160,18 @@ private:
         uint64_t dropped = 0;
         for (uint32_t y = tile.y * k_tile; y < y_end; ++y) {
             for (uint32_t x = tile.x * k_tile; x < x_end; ++x) {
-                const size_t pixel = static_cast<size_t>(y) * window.width + x;
-                const auto trace = [&](auto& sink) {
-                    const float alpha =
-                        trace_eye_path(scene_, pass_, cache, iteration, window.x + x, window.y + y, sink);
-                    dropped += sink.dropped;
-                    const Rgb c = sink.radiance;
-                    film.frame()[pixel] = {{c.r, c.g, c.b, alpha}};
-                };
+                const size_t i = static_cast<size_t>(y) * window.width + x;
+                const uint32_t px = window.x + x, py = window.y + y;
+                PixelSample& pixel = film.frame()[i];
                 if (film.has_guides()) {
-                    GuidedSink sink(pass_, scene_);
-                    trace(sink);
-                    film.guide_frame()[pixel] = sink.guide();
-                } else {
-                    PixelSink sink{pass_};
-                    trace(sink);
+                    GuideSample& guide = film.guide_frame()[i];
+                    dropped += trace_guided_pixel(scene_, pass_, cache, iteration, px, py, pixel, guide);
+                    continue;
                 }
+                PixelSink sink{pass_};
+                const float alpha = trace_eye_path(scene_, pass_, cache, iteration, px, py, sink);
+                dropped += sink.dropped;
+                pixel = {{sink.radiance.r, sink.radiance.g, sink.radiance.b, alpha}};
             }
         }
         count_dropped(dropped);

@@ -20,6 +20,7 @@ from .errors import Cancelled, DeviceError
 
 _NAMES = {"linux": "libOpenImageDenoise.so.2*", "darwin": "libOpenImageDenoise.2*dylib", "win32": "OpenImageDenoise.dll"}
 _CPU, _FLOAT3, _CANCELLED = 1, 3, 6  # of OIDNDeviceType, OIDNFormat, OIDNError
+_LEAST_SIDE = 32  # pixels: smaller pictures are mirrored up to it, as the network makes up what is beyond their edges
 _POLL_SECONDS = 0.05
 
 _Monitor = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_double)
@@ -50,9 +51,9 @@ def denoise(
         if image.shape != (height, width, 3):
             raise ValueError(f"{name} of shape {image.shape} for pixels of shape {pixels.shape}")
     library = load()
-    images = {name: _finite(image) for name, image in guides.items()} | {"color": _finite(pixels[..., :3])}
     if pixels.size == 0:
         return pixels.copy()
+    images = {name: _prepared(image) for name, image in (guides | {"color": pixels[..., :3]}).items()}
     stop = threading.Event()
     outcome: list[_Float32 | BaseException] = []
 
@@ -79,7 +80,7 @@ def denoise(
     result = outcome[0]
     if isinstance(result, BaseException):
         raise result
-    return np.concatenate([result, pixels[..., 3:]], axis=2)
+    return np.concatenate([result[:height, :width], pixels[..., 3:]], axis=2)
 
 
 @functools.cache
@@ -191,6 +192,8 @@ class _Device:
             raise DeviceError(f"denoising failed: {os.fsdecode(message.value or b'')} (Open Image Denoise, error {code})")
 
 
-def _finite(image: _Float32) -> _Float32:
-    """A packed copy for the library; its numbers that are not finite become 0."""
-    return np.nan_to_num(np.ascontiguousarray(image, np.float32), nan=0.0, posinf=0.0, neginf=0.0)
+def _prepared(image: _Float32) -> _Float32:
+    """A packed copy for the library: large enough, and with 0 for numbers that are not finite."""
+    finite = np.nan_to_num(np.asarray(image, np.float32), nan=0.0, posinf=0.0, neginf=0.0)
+    missing = [(0, max(_LEAST_SIDE - side, 0)) for side in image.shape[:2]]
+    return np.ascontiguousarray(np.pad(finite, (*missing, (0, 0)), mode="symmetric"))
