@@ -138,9 +138,9 @@ public:
                    "reading a denoiser's guides");
         check_cuda(cudaMemcpy(film.splats().data(), splats_.data(), splats_.bytes(), cudaMemcpyDeviceToHost),
                    "reading the splats");
-        check_cuda(cudaMemcpy(film.point_splats().data(), point_splats_.data(), point_splats_.bytes(),
-                              cudaMemcpyDeviceToHost),
-                   "reading the splats");
+        check_cuda(
+            cudaMemcpy(film.point_splats().data(), point_splats_.data(), point_splats_.bytes(), cudaMemcpyDeviceToHost),
+            "reading the splats");
         counters.dropped.fetch_add(dropped, std::memory_order_relaxed);
         film.commit_rows(0, window.height);
         film.count_iteration();

@@ -81,7 +81,8 @@ nb::object film_state(const Renderer& renderer) {
     auto* words = new int64_t[sums.size() * 2];
     std::memcpy(words, sums.data(), sums.size_bytes());
     nb::capsule owner(words, [](void* p) noexcept { delete[] static_cast<int64_t*>(p); });
-    return nb::cast(nb::ndarray<nb::numpy, int64_t>(words, {window.height, window.width, renderer.film().channels(), 2}, owner));
+    return nb::cast(
+        nb::ndarray<nb::numpy, int64_t>(words, {window.height, window.width, renderer.film().channels(), 2}, owner));
 }
 
 // Arrays of a film begin with its rows and columns.
@@ -97,8 +98,8 @@ void require_size_of_film(const Renderer& renderer, const A& array, const char* 
 void add_film_state(Renderer& renderer, FilmState state, uint64_t iterations) {
     require_size_of_film(renderer, state, "film state");
     if (state.shape(2) != renderer.film().channels()) {
-        throw std::invalid_argument("film state of " + std::to_string(state.shape(2)) +
-                                    " channels, but the film has " + std::to_string(renderer.film().channels()));
+        throw std::invalid_argument("film state of " + std::to_string(state.shape(2)) + " channels, but the film has " +
+                                    std::to_string(renderer.film().channels()));
     }
     renderer.film().add({reinterpret_cast<const ExactSum*>(state.data()), state.size() / 2}, iterations);
 }

@@ -45,8 +45,8 @@ struct GuidedSink : PixelSink {
     Rgb albedo{};
     Vec3 normal{};
     const EyeWalk* eye = nullptr;  // once it has left the lens
-    bool open = true;              // nothing blurred so far
-    bool sharp = false;            // the walk's last surface has sharp lobes alone
+    bool open = true;  // nothing blurred so far
+    bool sharp = false;  // the walk's last surface has sharp lobes alone
 
     VLP_HD GuidedSink(const PassSettings& settings, const SceneView& view) : PixelSink{settings}, scene(view) {}
 

@@ -14,8 +14,8 @@ from typing import Any, NoReturn
 
 from . import __version__, metrics
 from ._progress import ProgressDisplay, lost_light_text, summary_text
-from .errors import Cancelled, DeviceError, Error, SceneError
 from .denoise import denoise
+from .errors import Cancelled, DeviceError, Error, SceneError
 from .images import ALBEDO, NOISY, NORMAL, Depth, check_output, read_image, write_image
 from .merge import merge_images
 from .render import Renderer, devices, load_native, native_errors
@@ -134,7 +134,9 @@ def _parser() -> _Parser:
     )
     denoising.add_argument("file", type=Path, metavar="IN", help="its layer Noisy Image is taken where it has one")
     _add_output(denoising)
-    denoising.add_argument("--no-prefilter", action="store_true", help="take the guides as they are: faster, more error")
+    denoising.add_argument(
+        "--no-prefilter", action="store_true", help="take the guides as they are: faster, more error"
+    )
     denoising.add_argument("--threads", type=int, default=0, help="0 for all (default)")
 
     commands.add_parser("bench", help="measure speed and error over time (vlp-bpt bench --help)", add_help=False)

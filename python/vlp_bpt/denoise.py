@@ -9,7 +9,7 @@ import importlib.util
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,15 @@ from numpy.typing import NDArray
 
 from .errors import Cancelled, DeviceError
 
-_NAMES = {"linux": "libOpenImageDenoise.so.2*", "darwin": "libOpenImageDenoise.2*dylib", "win32": "OpenImageDenoise.dll"}
+_NAMES = {
+    "linux": "libOpenImageDenoise.so.2*",
+    "darwin": "libOpenImageDenoise.2*dylib",
+    "win32": "OpenImageDenoise.dll",
+}
 _CPU, _FLOAT3, _CANCELLED = 1, 3, 6  # of OIDNDeviceType, OIDNFormat, OIDNError
 _LEAST_SIDE = 32  # pixels: smaller pictures are mirrored up to it, as the network makes up what is beyond their edges
 _POLL_SECONDS = 0.05
+_SAID_CANCELLED = "denoising was cancelled"
 
 _Monitor = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_double)
 _Float32 = NDArray[np.float32]
@@ -45,7 +50,7 @@ def denoise(
     """
     height, width = pixels.shape[:2]
     guides = {name: image for name, image in (("albedo", albedo), ("normal", normal)) if image is not None}
-    if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or "normal" in guides and "albedo" not in guides:
+    if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or ("normal" in guides and "albedo" not in guides):
         raise ValueError(f"pixels of shape {pixels.shape} with {', '.join(guides) or 'no guides'}")
     for name, image in guides.items():
         if image.shape != (height, width, 3):
@@ -54,6 +59,8 @@ def denoise(
     if pixels.size == 0:
         return pixels.copy()
     images = {name: _prepared(image) for name, image in (guides | {"color": pixels[..., :3]}).items()}
+    if cancelled is not None and cancelled():
+        raise Cancelled(_SAID_CANCELLED)
     stop = threading.Event()
     outcome: list[_Float32 | BaseException] = []
 
@@ -71,16 +78,17 @@ def denoise(
     worker.start()
     try:
         while worker.is_alive():
-            worker.join(_POLL_SECONDS)
             if cancelled is not None and cancelled():
                 stop.set()
+            worker.join(_POLL_SECONDS)
     finally:
         stop.set()
         worker.join()
     result = outcome[0]
     if isinstance(result, BaseException):
         raise result
-    return np.concatenate([result[:height, :width], pixels[..., 3:]], axis=2)
+    (above, _), (left, _) = _margins((height, width))
+    return np.concatenate([result[above : above + height, left : left + width], pixels[..., 3:]], axis=2)
 
 
 @functools.cache
@@ -180,20 +188,27 @@ class _Device:
             library.oidnReleaseFilter(made)
         self._check()
         if self._stop.is_set():
-            raise Cancelled("denoising was cancelled")
+            raise Cancelled(_SAID_CANCELLED)
         return output
 
     def _check(self) -> None:
         message = ctypes.c_char_p()
         code = self._library.oidnGetDeviceError(self._device, ctypes.byref(message))
         if code == _CANCELLED:
-            raise Cancelled("denoising was cancelled")
+            raise Cancelled(_SAID_CANCELLED)
         if code:
-            raise DeviceError(f"denoising failed: {os.fsdecode(message.value or b'')} (Open Image Denoise, error {code})")
+            raise DeviceError(
+                f"denoising failed: {os.fsdecode(message.value or b'')} (Open Image Denoise, error {code})"
+            )
 
 
 def _prepared(image: _Float32) -> _Float32:
     """A packed copy for the library: large enough, and with 0 for numbers that are not finite."""
     finite = np.nan_to_num(np.asarray(image, np.float32), nan=0.0, posinf=0.0, neginf=0.0)
-    missing = [(0, max(_LEAST_SIDE - side, 0)) for side in image.shape[:2]]
-    return np.ascontiguousarray(np.pad(finite, (*missing, (0, 0)), mode="symmetric"))
+    return np.ascontiguousarray(np.pad(finite, (*_margins(image.shape[:2]), (0, 0)), mode="symmetric"))
+
+
+def _margins(sides: Sequence[int]) -> list[tuple[int, int]]:
+    """What a picture needs before and behind each of its sides to be large enough."""
+    missing = [max(_LEAST_SIDE - side, 0) for side in sides]
+    return [(m // 2, m - m // 2) for m in missing]

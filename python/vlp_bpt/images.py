@@ -20,7 +20,7 @@ _BLENDER_PREFIX = "VLP_BPT."  # of what the add-on stamps into files that Blende
 _HALF_MAX = 65504.0
 _STATE = "vlp_bpt.sums"  # the part of an EXR file that holds a film state
 _WORDS = 4  # of 32 bits, in a sum
-# Pictures that a file keeps beside its own, under Cycles' names: the picture before it was denoised, and what guided that.
+# Pictures that a file keeps beside its own, under Cycles' names: the picture before denoising, and what guided that.
 NOISY, ALBEDO, NORMAL = "Noisy Image", "Denoising Albedo", "Denoising Normal"
 _LAYERS = {NOISY: "RGBA", ALBEDO: "RGB", NORMAL: "XYZ"}  # their channels
 
@@ -139,7 +139,9 @@ def read_image(path: str | Path) -> Image:
         pixels, layers = _to_rgba(raw, names), _layers(raw, names)
         if spec.format.basetype in (oiio.UINT8, oiio.UINT16, oiio.UINT32):
             pixels[..., :3] = srgb_decode(pixels[..., :3]) * pixels[..., 3:]
-        return Image(np.ascontiguousarray(pixels[::-1]), known, _read_state(oiio, file, path), layers)
+        image = Image(np.ascontiguousarray(pixels[::-1]), known, layers=layers)
+        _read_further_parts(oiio, file, path, image)
+        return image
     finally:
         file.close()
 
@@ -213,11 +215,25 @@ def _state_channels(count: int) -> tuple[str, ...]:
     return tuple(f"sum.{i:02}" for i in range(count))  # file order is alphabetical
 
 
-def _read_state(oiio: Any, file: Any, path: Path) -> NDArray[np.int64] | None:
-    if not file.seek_subimage(1, 0) or file.spec().get_string_attribute("oiio:subimagename") != _STATE:
-        return None
+def _read_further_parts(oiio: Any, file: Any, path: Path, image: Image) -> None:
+    """The exact sums, and layers where Blender gave each a part of its own."""
+    part = 1
+    while file.seek_subimage(part, 0):
+        spec = file.spec()
+        if spec.get_string_attribute("oiio:subimagename") == _STATE:
+            image.film_state = _read_state(oiio, file, part, path)
+        elif (spec.height, spec.width) == image.pixels.shape[:2]:
+            raw = file.read_image(part, 0, 0, spec.nchannels, oiio.FLOAT)
+            if raw is None:
+                raise ImageError(f"'{path}': cannot be read: {file.geterror()}")
+            found = _layers(raw.reshape(spec.height, spec.width, spec.nchannels), list(spec.channelnames))
+            image.layers = found | image.layers
+        part += 1
+
+
+def _read_state(oiio: Any, file: Any, part: int, path: Path) -> NDArray[np.int64]:
     spec = file.spec()
-    words = file.read_image(1, 0, 0, spec.nchannels, oiio.UINT32)
+    words = file.read_image(part, 0, 0, spec.nchannels, oiio.UINT32)
     count = spec.nchannels
     if words is None or count % _WORDS or spec.channelnames != _state_channels(count):
         raise ImageError(f"'{path}': its exact sums cannot be read: {file.geterror()}")

@@ -47,8 +47,8 @@ class Progress:
 @dataclass(frozen=True)
 class Statistics:
     """What a render did and took. eye_samples and light_paths: in all; memory: bytes by part; dropped: non-finite
-    samples left out; build_seconds: uploading the scene and building its hierarchy; denoise_seconds: of the last picture
-    that was denoised, not part of seconds."""
+    samples left out; build_seconds: uploading the scene and building its hierarchy; denoise_seconds: of denoising the
+    last picture, not part of seconds."""
 
     iterations: int
     seconds: float
@@ -190,10 +190,13 @@ class Renderer:
         if not self.settings.denoise:
             return image
         started = time.perf_counter()
-        guides = image.layers[ALBEDO], image.layers[NORMAL]
-        options = {"prefilter": self.settings.denoise_prefilter, "threads": self.settings.threads}
         try:
-            color = denoise.denoise(self._guided()[0], *guides, **options, cancelled=cancelled)
+            color = denoise.denoise(
+                *self._guided(),
+                prefilter=self.settings.denoise_prefilter,
+                threads=self.settings.threads,
+                cancelled=cancelled,
+            )
         except Cancelled:
             return image
         except DeviceError as error:
@@ -205,8 +208,8 @@ class Renderer:
         return image
 
     def layers(self) -> dict[str, NDArray[np.float32]]:
-        """With `settings.denoise`, what files keep beside the denoised picture, sized and laid out as `read` has it: NOISY
-        (4 channels), ALBEDO and NORMAL (3); else nothing. Names are those of `vlp_bpt.images`."""
+        """What files keep beside the denoised picture, by the names of `vlp_bpt.images`; nothing without
+        `settings.denoise`. NOISY is `read`'s; ALBEDO and NORMAL (in world space) are (height, width, 3)."""
         if not self.settings.denoise:
             return {}
         _, albedo, normal = self._guided()
@@ -223,8 +226,8 @@ class Renderer:
         return out
 
     def film_state(self) -> NDArray[np.int64]:
-        """The exact sums behind the picture: (height, width, 4, 2) int64, 128-bit fixed point as low and high words; with
-        `settings.denoise` 13 in place of 4."""
+        """The exact sums behind the picture: (height, width, 4, 2) int64, 128-bit fixed point as low and high words; 13
+        in place of 4 with `settings.denoise`."""
         with self._lock, native_errors():
             return np.asarray(self._native.film_state()).view(np.int64)
 
