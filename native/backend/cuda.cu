@@ -48,14 +48,15 @@ __global__ void list_stored(PassSettings pass, const LightVertex* slots, const u
     }
 }
 
+// `found` is the part of the sink that sums up the pixel.
 template <typename Sink>
 __device__ void trace_pixel(const SceneView& scene, const PassSettings& pass, const LightVertexCache& cache,
-                            uint32_t iteration, Window window, uint32_t pixel, Sink& sink, PixelSample* frame,
-                            unsigned long long* dropped) {
+                            uint32_t iteration, Window window, uint32_t pixel, Sink& sink, const PixelSink& found,
+                            PixelSample* frame, unsigned long long* dropped) {
     const uint32_t x = window.x + pixel % window.width, y = window.y + pixel / window.width;
     const float alpha = trace_eye_path(scene, pass, cache, iteration, x, y, sink);
-    if (sink.dropped > 0) atomicAdd(dropped, static_cast<unsigned long long>(sink.dropped));
-    frame[pixel] = {{sink.radiance.r, sink.radiance.g, sink.radiance.b, alpha}};
+    if (found.dropped > 0) atomicAdd(dropped, static_cast<unsigned long long>(found.dropped));
+    frame[pixel] = {{found.radiance.r, found.radiance.g, found.radiance.b, alpha}};
 }
 
 __global__ void eye_pass(SceneView scene, PassSettings pass, LightVertexCache cache, uint32_t iteration, Window window,
@@ -63,7 +64,7 @@ __global__ void eye_pass(SceneView scene, PassSettings pass, LightVertexCache ca
     const uint32_t pixel = first_pixel + blockIdx.x * blockDim.x + threadIdx.x;
     if (pixel >= end_pixel) return;
     PixelSink sink{pass};
-    trace_pixel(scene, pass, cache, iteration, window, pixel, sink, frame, dropped);
+    trace_pixel(scene, pass, cache, iteration, window, pixel, sink, sink, frame, dropped);
 }
 
 // A kernel of its own: without guides the eye pass has no code for them.
@@ -73,7 +74,7 @@ __global__ void guided_eye_pass(SceneView scene, PassSettings pass, LightVertexC
     const uint32_t pixel = first_pixel + blockIdx.x * blockDim.x + threadIdx.x;
     if (pixel >= end_pixel) return;
     GuidedSink sink(pass, scene);
-    trace_pixel(scene, pass, cache, iteration, window, pixel, sink, frame, dropped);
+    trace_pixel(scene, pass, cache, iteration, window, pixel, sink, sink.pixel, frame, dropped);
     guides[pixel] = sink.guide();
 }
 

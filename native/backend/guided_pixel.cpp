@@ -9,9 +9,10 @@ uint32_t trace_guided_pixel(const SceneView& scene, const PassSettings& pass, co
                             uint32_t iteration, uint32_t x, uint32_t y, PixelSample& pixel, GuideSample& guide) {
     GuidedSink sink(pass, scene);
     const float alpha = trace_eye_path(scene, pass, cache, iteration, x, y, sink);
-    pixel = {{sink.radiance.r, sink.radiance.g, sink.radiance.b, alpha}};
+    const Rgb found = sink.pixel.radiance;
+    pixel = {{found.r, found.g, found.b, alpha}};
     guide = sink.guide();
-    return sink.dropped;
+    return sink.pixel.dropped;
 }
 
 }  // namespace vlp

@@ -40,7 +40,8 @@ VLP_HD inline bool is_sharp(const Bsdf& bsdf) {
 
 // Sums up a pixel's path as PixelSink does, and its guides. Their means over many paths are what counts: of a single one
 // the albedo may exceed 1, as throughputs do.
-struct GuidedSink : PixelSink {
+struct GuidedSink {
+    PixelSink pixel;
     const SceneView& scene;
     Rgb albedo{};
     Vec3 normal{};
@@ -48,10 +49,10 @@ struct GuidedSink : PixelSink {
     bool open = true;  // nothing blurred so far
     bool sharp = false;  // the walk's last surface has sharp lobes alone
 
-    VLP_HD GuidedSink(const PassSettings& settings, const SceneView& view) : PixelSink{settings}, scene(view) {}
+    VLP_HD GuidedSink(const PassSettings& settings, const SceneView& view) : pixel{settings}, scene(view) {}
 
     VLP_HD void add(const Contribution& c) {
-        PixelSink::add(c);
+        pixel.add(c);
         if (c.s != 0 || (eye != nullptr && !sees(eye->t + 1))) return;
         const Rgb most = eye != nullptr ? eye->throughput : rgb(1);
         albedo += {min_of(c.value.r, most.r), min_of(c.value.g, most.g), min_of(c.value.b, most.b)};
