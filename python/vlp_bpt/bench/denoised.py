@@ -101,28 +101,37 @@ def seconds_to(points: list[Point], ssim: float) -> float | None:
     return None
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Prints each render and, per contestant, the seconds to an SSIM; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m vlp_bpt.bench.denoised", description=__doc__)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of this benchmark."""
     parser.add_argument("scene", nargs="?", default="cornell_box", help="a file, or the name of one in scenes/")
     parser.add_argument("--size", type=int, default=512, help="width in pixels (default: 512)")
     parser.add_argument("--ssim", type=float, default=0.998, help="to be reached (default: 0.998)")
     parser.add_argument("--samples", type=int, default=256, help="most to try (default: 256)")
     parser.add_argument("--reference-seconds", type=float, default=300.0, help="of each half (default: 300)")
     parser.add_argument("--threads", type=int, default=0, help="0 for all (default)")
-    options = parser.parse_args(arguments)
-    try:
-        path = find_scene(options.scene)
-        scene = load_scene(path, options.size)
-        halves = reference_halves(path.stem, scene, options.reference_seconds, options.threads)
-        renders = contestants(path, scene, options.threads)
-        points = measure(renders, halves, options.samples, options.ssim)
-    except Error as error:
-        print(f"vlp-bpt: {error}", file=sys.stderr)
-        return 1
+
+
+def run(options: argparse.Namespace) -> None:
+    """Prints each render and, per contestant, the seconds to an SSIM."""
+    path = find_scene(options.scene)
+    scene = load_scene(path, options.size)
+    halves = reference_halves(path.stem, scene, options.reference_seconds, options.threads)
+    renders = contestants(path, scene, options.threads)
+    points = measure(renders, halves, options.samples, options.ssim)
     for name in renders:
         seconds = seconds_to([point for point in points if point.name == name], options.ssim)
         print(f"{name}: SSIM {options.ssim:g} " + ("not reached" if seconds is None else f"after {seconds:.1f} s"))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs it and returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m vlp_bpt.bench.denoised", description=__doc__)
+    add_arguments(parser)
+    try:
+        run(parser.parse_args(arguments))
+    except Error as error:
+        print(f"vlp-bpt: {error}", file=sys.stderr)
+        return 1
     return 0
 
 
