@@ -310,6 +310,8 @@ def _info(options: argparse.Namespace) -> int:
     print(f"{options.file}: {width} x {height} pixels, mean ({mean})")
     for name, value in image.metadata.items():
         print(f"  {name}: {json.dumps(value)}")
+    if image.layers:
+        print(f"  layers: {', '.join(image.layers)}")
     if image.film_state is not None:
         print("  holds exact sums: can be merged")
     return 0

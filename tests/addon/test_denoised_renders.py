@@ -13,7 +13,7 @@ import numpy as np
 import OpenImageIO
 import pytest
 
-from addon import final
+from addon import figures, final
 from vlp_bpt import Cancelled, denoise
 from vlp_bpt.images import ALBEDO, NOISY, NORMAL, read_image
 
@@ -89,6 +89,7 @@ def test_the_passes_are_in_the_file(tmp_path: Path) -> None:
     assert not np.array_equal(image.pixels, noisy)
     assert image.pixels[..., :3].std() < noisy[..., :3].std()
     assert abs(image.pixels[..., :3].mean() / noisy[..., :3].mean() - 1) < 0.03
+    assert "Denoising" in dict(figures.last[("Scene", "ViewLayer")])
 
 
 def test_the_noisy_pass_is_the_picture_without_denoising(tmp_path: Path) -> None:

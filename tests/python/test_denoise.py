@@ -245,6 +245,8 @@ def test_the_command_denoises_a_file(tmp_path: Path, capsys: pytest.CaptureFixtu
         out = tmp_path / f"{name}_clean.exr"
         assert cli.main(["denoise", str(tmp_path / f"{name}.exr"), "-o", str(out), "--no-prefilter"]) == 0
         assert words in capsys.readouterr().out
+        assert cli.main(["info", str(out)]) == 0
+        assert f"layers: {NOISY}" in capsys.readouterr().out
         clean = read_image(out)
         assert np.array_equal(clean.layers[NOISY], image.layers[NOISY])
         assert not np.array_equal(clean.pixels, image.layers[NOISY])
