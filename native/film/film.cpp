@@ -31,7 +31,7 @@ void Film::commit_rows(uint32_t begin, uint32_t end) {
             sum[4 + c].add(frame_[i].rgba[c]);
             if (has_splats()) sum[4 + c].add(point_splats_[3 * i + c]);
             sum[7 + c].add(guide_frame_[i].albedo[c]);
-            sum[10 + c].add(guide_frame_[i].normal[c] + 1);
+            sum[10 + c].add(std::max(guide_frame_[i].normal[c] + 1, 0.0f));  // unit vectors are rounded, too
         }
     }
 }

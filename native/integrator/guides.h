@@ -3,7 +3,8 @@
 // A mirror or a pane of glass has no colour of its own that would tell it from its neighbours: what tells apart is what is
 // seen in it. So a walk is followed through sharp lobes, as long as it takes them, to the first one that blurs, and its
 // albedo is tinted by what the sharp ones did to the throughput: for glass, reflection and refraction blend by their
-// Fresnel shares. A surface that has both blurs with its blurring lobes and goes on with the sharp ones.
+// Fresnel shares. A surface that has both blurs with its blurring lobes and goes on with the sharp ones. The normal is that
+// of the last surface so reached, none where that is sharp alone and the walk leaves it for the background.
 // Lamps, shining surfaces and the background count with their radiance, no channel above 1.
 #pragma once
 
@@ -63,16 +64,13 @@ struct GuidedSink {
         if (!open) return;
         const Bsdf bsdf = make_bsdf(scene, walk.surface);
         sharp = is_sharp(bsdf);
+        normal = sharp ? Vec3{} : face_toward(bsdf.normal, walk.w_eye);
         if (sharp) return;
         const float cos_eye = dot(walk.w_eye, bsdf.normal);
-        float blurred = bsdf.count == 0 ? 1.0f : 0.0f;  // share of the walks that sharp lobes do not take on
         for (uint32_t i = 0; i < bsdf.count; ++i) {
             const Lobe& lobe = bsdf.lobes[i];
-            if (is_specular(lobe)) continue;
-            albedo += walk.throughput * lobe_albedo(bsdf, lobe, cos_eye);
-            blurred += lobe.selection;
+            if (!is_specular(lobe)) albedo += walk.throughput * lobe_albedo(bsdf, lobe, cos_eye);
         }
-        normal += face_toward(bsdf.normal, walk.w_eye) * blurred;
     }
 
     VLP_HD GuideSample guide() const {

@@ -93,9 +93,20 @@ def test_gloss_over_a_colour_keeps_the_colour() -> None:
     scene = above(16).add(square(4), plastic).add(square(4, (0, 0, 9)), diffuse((1, 1, 1))).scene
     albedo, normal = guides(scene, 256)
     assert_mean(albedo, np.multiply(ORANGE, 0.96) + 0.04)
-    share = 1 - (1 - normal.reshape(-1, 3).mean(axis=0)[2]) / 2  # of the walks that the colour takes
+    share = 0.5 + normal.reshape(-1, 3).mean(axis=0)[2] / 2  # of the walks that the colour takes
     assert 0.7 < share < 0.99
     assert np.abs(normal[..., :2]).max() < 1e-6
+
+
+def test_normals_of_facing_mirrors_with_a_colour_stay_unit_vectors() -> None:
+    """Walks that meet the same normal again and again, of which sums would leave the range that the film keeps."""
+    satin = Material(
+        "satin", (Lobe(LobeKind.DIFFUSE, (0.5, 0.5, 0.5)), Lobe(LobeKind.REFLECTION, (0.5, 0.5, 0.5), 0.0))
+    )
+    scene = above(16).add(square(4), satin).add(square(4, (0, 0, 9)), satin).scene
+    albedo, normal = guides(scene, 64, eye_path_length=16)
+    assert np.abs(normal[..., 2]).max() <= 1
+    assert_mean(albedo, (1, 1, 1), 0.03)
 
 
 def test_a_veil_shows_some_of_what_is_behind() -> None:
