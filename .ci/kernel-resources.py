@@ -21,7 +21,7 @@ def parse_log(text: str) -> Table:
     memory = (0, 0, 0)
     for line in text.splitlines():
         if match := re.search(r"Compiling entry function '(\S+)' for 'sm_(\w+)'", line):
-            name = re.search(r"\d(light_pass|list_stored|eye_pass)E", match[1])
+            name = re.search(r"\d(light_pass|list_stored|eye_pass|guided_eye_pass)E", match[1])
             entry = (name[1], f"sm_{match[2]}") if name else None
         elif match := re.search(r"(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads", line):
             memory = (int(match[1]), int(match[2]), int(match[3]))

@@ -4,8 +4,8 @@
 
 #include "backend/backend.h"
 #include "backend/device_buffer.h"
+#include "integrator/guides.h"
 #include "integrator/light_tracing.h"
-#include "integrator/path_tracing.h"
 #include "scene/scene.h"
 
 namespace vlp {
@@ -25,11 +25,11 @@ struct AtomicAdd {
 
 __global__ void light_pass(SceneView scene, PassSettings pass, uint32_t iteration, Window window, uint32_t first_path,
                            uint32_t end_path, LightVertex* slots, uint32_t* stored_in_path, ExactSum* splats,
-                           unsigned long long* dropped) {
+                           ExactSum* point_splats, unsigned long long* dropped) {
     const uint32_t path = first_path + blockIdx.x * blockDim.x + threadIdx.x;
     if (path >= end_path) return;
     LightVertex* own = slots + static_cast<size_t>(path) * pass.light_path_length;
-    SplatSink<AtomicAdd> sink{pass, window, splats, {}};
+    SplatSink<AtomicAdd> sink{pass, window, splats, point_splats, {}};
     const LightPathCounts counts = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
     for (uint32_t i = counts.vertices; i < pass.light_path_length; ++i) own[i].packed = 0;
     stored_in_path[path] = counts.connectible;
@@ -48,15 +48,34 @@ __global__ void list_stored(PassSettings pass, const LightVertex* slots, const u
     }
 }
 
+// `found` is the part of the sink that sums up the pixel.
+template <typename Sink>
+__device__ void trace_pixel(const SceneView& scene, const PassSettings& pass, const LightVertexCache& cache,
+                            uint32_t iteration, Window window, uint32_t pixel, Sink& sink, const PixelSink& found,
+                            PixelSample* frame, unsigned long long* dropped) {
+    const uint32_t x = window.x + pixel % window.width, y = window.y + pixel / window.width;
+    const float alpha = trace_eye_path(scene, pass, cache, iteration, x, y, sink);
+    if (found.dropped > 0) atomicAdd(dropped, static_cast<unsigned long long>(found.dropped));
+    frame[pixel] = {{found.radiance.r, found.radiance.g, found.radiance.b, alpha}};
+}
+
 __global__ void eye_pass(SceneView scene, PassSettings pass, LightVertexCache cache, uint32_t iteration, Window window,
                          uint32_t first_pixel, uint32_t end_pixel, PixelSample* frame, unsigned long long* dropped) {
     const uint32_t pixel = first_pixel + blockIdx.x * blockDim.x + threadIdx.x;
     if (pixel >= end_pixel) return;
-    const uint32_t x = window.x + pixel % window.width, y = window.y + pixel / window.width;
     PixelSink sink{pass};
-    const float alpha = trace_eye_path(scene, pass, cache, iteration, x, y, sink);
-    if (sink.dropped > 0) atomicAdd(dropped, static_cast<unsigned long long>(sink.dropped));
-    frame[pixel] = {{sink.radiance.r, sink.radiance.g, sink.radiance.b, alpha}};
+    trace_pixel(scene, pass, cache, iteration, window, pixel, sink, sink, frame, dropped);
+}
+
+// A kernel of its own: without guides the eye pass has no code for them.
+__global__ void guided_eye_pass(SceneView scene, PassSettings pass, LightVertexCache cache, uint32_t iteration,
+                                Window window, uint32_t first_pixel, uint32_t end_pixel, PixelSample* frame,
+                                unsigned long long* dropped, GuideSample* guides) {
+    const uint32_t pixel = first_pixel + blockIdx.x * blockDim.x + threadIdx.x;
+    if (pixel >= end_pixel) return;
+    GuidedSink sink(pass, scene);
+    trace_pixel(scene, pass, cache, iteration, window, pixel, sink, sink.pixel, frame, dropped);
+    guides[pixel] = sink.guide();
 }
 
 class CudaBackend final : public Backend {
@@ -72,7 +91,10 @@ public:
         dropped_ = DeviceBuffer<unsigned long long>(1, "a counter");
         frame_ = DeviceBuffer<PixelSample>(scene.window().pixel_count(), "the film");
         if (pass_.splats) splats_ = DeviceBuffer<ExactSum>(scene.window().pixel_count() * 3, "splats");
-        bytes_ += frame_.bytes() + splats_.bytes();
+        if (pass_.splats && pass_.guides)
+            point_splats_ = DeviceBuffer<ExactSum>(scene.window().pixel_count() * 3, "splats");
+        if (pass_.guides) guides_ = DeviceBuffer<GuideSample>(scene.window().pixel_count(), "a denoiser's guides");
+        bytes_ += frame_.bytes() + splats_.bytes() + point_splats_.bytes() + guides_.bytes();
         if (pass_.traces_light()) {
             const size_t capacity = static_cast<size_t>(pass_.light_paths) * pass_.light_path_length;
             slots_ = DeviceBuffer<LightVertex>(capacity, "light vertices");
@@ -96,8 +118,14 @@ public:
         for (uint32_t first = 0; first < pixels; first += k_pixels_per_launch) {
             if (stop) return false;
             const uint32_t end = std::min(pixels, first + k_pixels_per_launch);
-            eye_pass<<<blocks_for(end - first), k_block_size>>>(scene_, pass_, cache, iteration, window, first, end,
-                                                                frame_.data(), dropped_.data());
+            if (pass_.guides) {
+                guided_eye_pass<<<blocks_for(end - first), k_block_size>>>(scene_, pass_, cache, iteration, window,
+                                                                           first, end, frame_.data(), dropped_.data(),
+                                                                           guides_.data());
+            } else {
+                eye_pass<<<blocks_for(end - first), k_block_size>>>(scene_, pass_, cache, iteration, window, first, end,
+                                                                    frame_.data(), dropped_.data());
+            }
             check_cuda(cudaGetLastError(), "starting the eye pass");
             check_cuda(cudaDeviceSynchronize(), "the eye pass");
             counters.work_done = end;
@@ -107,8 +135,13 @@ public:
         check_cuda(cudaMemcpy(&dropped, dropped_.data(), sizeof dropped, cudaMemcpyDeviceToHost), "reading a counter");
         check_cuda(cudaMemcpy(film.frame().data(), frame_.data(), frame_.bytes(), cudaMemcpyDeviceToHost),
                    "reading the film");
+        check_cuda(cudaMemcpy(film.guide_frame().data(), guides_.data(), guides_.bytes(), cudaMemcpyDeviceToHost),
+                   "reading a denoiser's guides");
         check_cuda(cudaMemcpy(film.splats().data(), splats_.data(), splats_.bytes(), cudaMemcpyDeviceToHost),
                    "reading the splats");
+        check_cuda(
+            cudaMemcpy(film.point_splats().data(), point_splats_.data(), point_splats_.bytes(), cudaMemcpyDeviceToHost),
+            "reading the splats");
         counters.dropped.fetch_add(dropped, std::memory_order_relaxed);
         film.commit_rows(0, window.height);
         film.count_iteration();
@@ -122,12 +155,13 @@ private:
         if (slots_.size() == 0) return {};
         const uint32_t paths = pass_.light_paths;
         check_cuda(cudaMemset(splats_.data(), 0, splats_.bytes()), "clearing the splats");
+        check_cuda(cudaMemset(point_splats_.data(), 0, point_splats_.bytes()), "clearing the splats");
         for (uint32_t first = 0; first < paths; first += k_paths_per_launch) {
             if (stop) return {};
             const uint32_t end = std::min(paths, first + k_paths_per_launch);
             light_pass<<<blocks_for(end - first), k_block_size>>>(scene_, pass_, iteration, window, first, end,
                                                                   slots_.data(), end_of_path_.data(), splats_.data(),
-                                                                  dropped_.data());
+                                                                  point_splats_.data(), dropped_.data());
             check_cuda(cudaGetLastError(), "starting the light pass");
             check_cuda(cudaDeviceSynchronize(), "the light pass");
         }
@@ -151,7 +185,8 @@ private:
     DeviceBuffer<uint32_t> stored_, end_of_path_;
     DeviceBuffer<std::byte> scratch_;
     DeviceBuffer<PixelSample> frame_;
-    DeviceBuffer<ExactSum> splats_;
+    DeviceBuffer<GuideSample> guides_;
+    DeviceBuffer<ExactSum> splats_, point_splats_;
     DeviceBuffer<unsigned long long> dropped_;
     size_t bytes_ = 0;
 };

@@ -58,7 +58,7 @@ Renderer::Renderer(std::shared_ptr<const Scene> scene, const PassSettings& pass,
                    uint32_t first, uint32_t end)
     : scene_(std::move(scene)),
       pass_(pass),
-      film_(window, pass.splats),
+      film_(window, pass.splats, pass.guides),
       main_(std::move(devices.main)),
       active_(main_.get()),
       helper_(devices.helper ? std::make_unique<Helper>(std::move(devices.helper), film_) : nullptr),
