@@ -55,7 +55,9 @@ def test_help_teaches(folder: Path) -> None:
 
 def test_render_writes_a_picture_and_says_what_it_took(folder: Path) -> None:
     result = vlp_bpt(folder, "render", "room.vlp.npz", "-o", "a.exr")
-    assert re.fullmatch(r"a\.exr: 6 iterations, \d+\.\d\d s, \d+\.\d{3} Msamples/s, .*\n", result.stdout)
+    memory, summary = result.stdout.splitlines()
+    assert re.fullmatch(r"room\.vlp\.npz: 10 triangles, .*; memory: CPU \d+\.\d MiB", memory)
+    assert re.fullmatch(r"a\.exr: 6 iterations, \d+\.\d\d s, \d+\.\d{3} Msamples/s, .*", summary)
     image = read_image(folder / "a.exr")
     assert image.pixels.shape == (16, 24, 4)
     assert image.metadata["settings"]["mode"] == "PAPER"
@@ -141,7 +143,7 @@ def test_info(folder: Path) -> None:
     scene = vlp_bpt(folder, "info", "room.vlp.npz").stdout
     assert "10 triangles, 0 spheres, 1 instances, 1 materials, 1 lights" in scene
     assert "24 x 16 pixels" in scene
-    assert "memory (MiB): " in scene
+    assert "memory to render with device=CPU (MiB): CPU " in scene
     assert 'note: "hi"' in scene
     picture = vlp_bpt(folder, "info", "grey.exr").stdout
     assert "grey.exr: 24 x 16 pixels, mean (0.5, 0.5, 0.5)" in picture
