@@ -16,8 +16,10 @@ void check_cuda(cudaError_t error, const std::string& what) {
     throw std::runtime_error(message);
 }
 
+// Two blocks a processor let every pass keep what it works on in registers.
 template <typename Body>
-__global__ void __launch_bounds__(k_block_size) run(const __grid_constant__ Body body, uint32_t begin, uint32_t end) {
+__global__ void __launch_bounds__(k_block_size, 2)
+    run(const __grid_constant__ Body body, uint32_t begin, uint32_t end) {
     const uint32_t i = begin + blockIdx.x * blockDim.x + threadIdx.x;
     if (i < end) body(i);
 }

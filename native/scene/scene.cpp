@@ -35,6 +35,27 @@ uint64_t next_revision() {
     return ++last;
 }
 
+bool equal(OctNormal a, OctNormal b) { return a.bits == b.bits; }
+bool equal(Vec2 a, Vec2 b) { return a.x == b.x && a.y == b.y; }
+
+// Smooth meshes say the same at every corner of a vertex, and take a sixth of the room with one value for each. Fills
+// `of_vertex` with these, or returns false where corners of a vertex differ or that would take more.
+template <typename T>
+bool by_vertex(std::span<const T> of_corner, std::span<const Triangle> triangles, size_t vertices,
+               std::vector<T>& of_vertex) {
+    if (of_corner.size() <= vertices) return false;
+    std::vector<T> values(vertices);
+    std::vector<bool> known(vertices);
+    for (size_t i = 0; i < of_corner.size(); ++i) {
+        const uint32_t v = triangles[i / 3].v[i % 3];
+        if (known[v] && !equal(values[v], of_corner[i])) return false;
+        values[v] = of_corner[i];
+        known[v] = true;
+    }
+    of_vertex = std::move(values);
+    return true;
+}
+
 // The factor of a transform that scales every direction alike; 0 when it does not.
 float uniform_scale(const Affine& a) {
     const float x = length(a.column(0)), y = length(a.column(1)), z = length(a.column(2));
@@ -57,6 +78,8 @@ GeometryView Scene::Geometry::view(const Place& place) const {
     v.triangles = put(triangles);
     v.corner_normals = put(corner_normals);
     v.uvs = put(uvs);
+    v.normals_by_vertex = normals_by_vertex;
+    v.uvs_by_vertex = uvs_by_vertex;
     v.spheres = put(spheres);
     v.material_slots = put(slots);
     return v;
@@ -74,12 +97,15 @@ uint32_t Scene::add_mesh(std::span<const Vec3> positions, std::span<const Triang
     Geometry g;
     g.positions.assign(positions.begin(), positions.end());
     g.triangles.assign(triangles.begin(), triangles.end());
-    g.corner_normals.resize(corner_normals.size());
-    for (size_t i = 0; i < corner_normals.size(); ++i) {
+    std::vector<OctNormal> normals(corner_normals.size());
+    for (size_t i = 0; i < normals.size(); ++i) {
         const float l = length(corner_normals[i]);
-        g.corner_normals[i] = encode(l > 0 ? corner_normals[i] / l : Vec3{0, 0, 1});
+        normals[i] = encode(l > 0 ? corner_normals[i] / l : Vec3{0, 0, 1});
     }
-    g.uvs.assign(uvs.begin(), uvs.end());
+    g.normals_by_vertex = by_vertex<OctNormal>(normals, triangles, positions.size(), g.corner_normals);
+    if (!g.normals_by_vertex) g.corner_normals = std::move(normals);
+    g.uvs_by_vertex = by_vertex<Vec2>(uvs, triangles, positions.size(), g.uvs);
+    if (!g.uvs_by_vertex) g.uvs.assign(uvs.begin(), uvs.end());
     g.slots = narrow(slots);
     geometries_.push_back(std::move(g));
     return static_cast<uint32_t>(geometries_.size() - 1);

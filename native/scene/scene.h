@@ -88,6 +88,7 @@ private:
         std::vector<Triangle> triangles;
         std::vector<OctNormal> corner_normals;
         std::vector<Vec2> uvs;
+        bool normals_by_vertex = false, uvs_by_vertex = false;
         std::vector<Sphere> spheres;
         std::vector<uint16_t> slots;
 

@@ -315,7 +315,8 @@ class _Session:
         while True:
             self._render()
             # A device that fails while it is read loses what it alone had.
-            change = self.renderer._native.settle()
+            with self.renderer._lock, native_errors():
+                change = int(self.renderer._native.settle())
             self.done += change
             if change >= 0:
                 return
