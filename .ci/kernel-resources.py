@@ -1,10 +1,10 @@
 """kernel-resources.py LOG LIBRARY NVDISASM LIMITS: what each kernel takes, as tables; fails where one takes too much.
 
-LOG is what ptxas -v says and LIBRARY what it made, uncompressed. LIMITS is a Markdown file that begins with the first table:
-registers, stack (bytes), spill stores and loads (bytes, with the functions that the kernel calls). Kernels that stand in one
-of LOG and LIMITS alone fail too. The second table counts instructions by function: all, those in double precision, and those of
-the special function units (MUFU: reciprocals, roots) with the files that most of them come from. With --write both tables are
-written to LIMITS instead.
+LOG is what ptxas -v says and LIBRARY what it made, uncompressed. LIMITS is a Markdown file that begins with the first
+table: registers, stack (bytes), spill stores and loads (bytes, with the functions that the kernel calls). Kernels that
+stand in one of LOG and LIMITS alone fail too. The second table counts instructions by function: all, those in double
+precision, and those of the special function units (MUFU: reciprocals, roots) with the files that most of them come
+from. With --write both tables are written to LIMITS instead.
 """
 
 from __future__ import annotations
