@@ -8,6 +8,7 @@
 
 #include <cstdlib>
 #include <cstring>
+#include <map>
 #include <numeric>
 
 namespace vlp::test {
@@ -390,6 +391,41 @@ TEST_F(GpuUpdate, OfTheGeometryUploadsAll) {
     EXPECT_EQ(render.renderer->iterate(3), 3u);
     render.renderer->settle();
     expect_same_sums(render.renderer->film().sums(), cpu_sums(*scene, render.renderer->pass(), 3));
+}
+
+TEST_F(GpuUpdate, ThatFailsIsMadeByTheCpu) {
+    render.machine.launches_until_failure = 0;
+    update({.materials = true}, [](Scene& s) { add_materials(s); });
+    ASSERT_EQ(render.renderer->notes().size(), 1u);
+    EXPECT_EQ(render.renderer->notes()[0], "device HOST: the passes: lost; going on with the CPU");
+}
+
+TEST_F(GpuUpdate, WithTooManyLightPathsRendersFewer) {
+    const MemoryLimit limit(device_memory_taken() + 1'000'000);
+    const PassSettings asked = for_scene(scene->view(), balanced(100'000));
+    render.renderer->update(scene, asked, 0, 1000);
+    PassSettings fewer = asked;
+    fewer.light_paths = 1562;
+    EXPECT_EQ(render.renderer->pass().light_paths, 1562u);  // a half of a half ... of 100 000, once it fits
+    ASSERT_EQ(render.renderer->notes().size(), 1u);
+    EXPECT_EQ(render.renderer->notes()[0], "device CUDA: out of memory for 100000 light paths; rendering with 1562");
+    EXPECT_EQ(render.renderer->iterate(2), 2u);
+    render.renderer->settle();
+    expect_same_sums(render.renderer->film().sums(), cpu_sums(*scene, fewer, 2));
+}
+
+TEST_F(GpuUpdate, OfTwoDevicesReachesBoth) {
+    GpuRender both(scene, balanced(), "HYBRID");
+    EXPECT_EQ(both.renderer->iterate(4), 4u);
+    scene->reopen({.lamps = true});
+    scene->add_lamp(make_point({0, 0, 1.5f}, {9, 9, 9}, 0.1f).value(), 0);
+    scene->build(1);
+    both.renderer->update(scene, for_scene(scene->view(), balanced()), 0, 6);
+    EXPECT_EQ(both.renderer->iterate(6), 6u);
+    both.renderer->rest();
+    both.renderer->settle();
+    EXPECT_EQ(both.renderer->iterations().finished(), (std::map<uint32_t, uint32_t>{{0, 6}}));
+    expect_same_sums(both.renderer->film().sums(), cpu_sums(*scene, both.renderer->pass(), 6));
 }
 
 TEST_F(GpuUpdate, OnTheCpuCopiesNothing) {
