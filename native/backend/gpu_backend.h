@@ -68,9 +68,9 @@ public:
         const EyePass eye{scene_,         pass_,         iteration,     window_, has_vlps ? slots_.data() : nullptr,
                           stored_.data(), frame_.data(), counts_.data()};
         if (!launch_in_batches(pixels(), eye, stop)) return false;
+        device_.download(Queue::passes, counts_here_.data(), counts_.data(), counts_.bytes());
         if (downloading_ > 0) device_.queue_wait(Queue::passes, downloaded_);
         device_.launch(0, 4 * pixels(), Commit{frame_.data(), splats_.data(), sums_.data(), kept_ == 0});
-        device_.download(Queue::passes, counts_here_.data(), counts_.data(), counts_.bytes());
         splats_are_clear_ = true;
         ++kept_;
         return true;

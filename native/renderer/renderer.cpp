@@ -134,23 +134,25 @@ int Renderer::run_one() {
     bool done = false;
     try {
         done = main.run_iteration(*own, film_, stop_);
+        if (done) {
+            iterations_.finish(*own);
+            unsaved_.push_back(*own);
+        }
         if (std::chrono::duration<double>(start - collected_).count() > k_seconds_between_collections) {
             main.begin_collect();
             collected_ = start;
         }
     } catch (const std::runtime_error& error) {
-        iterations_.give_back(*own);
-        return go_on_without_main(error.what());
+        if (!done) iterations_.give_back(*own);
+        return (done ? 1 : 0) + go_on_without_main(error.what());
     }
+    while (unsaved_.size() > main.kept()) unsaved_.pop_front();
+    update_total();
     if (!done) {
         iterations_.give_back(*own);
         return 0;
     }
-    iterations_.finish(*own);
-    unsaved_.push_back(*own);
-    while (unsaved_.size() > main.kept()) unsaved_.pop_front();
     took_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    update_total();
     return 1;
 }
 
@@ -179,13 +181,14 @@ int Renderer::settle() {
 // Saves what the failed device can still tell, and gives back the iterations that it cannot. Returns how many.
 int Renderer::give_back_lost() {
     Backend& failed = *active_.load();
+    int lost = 0;
     try {
         failed.collect(film_);
-    } catch (const std::runtime_error&) {  // told already
+    } catch (const std::runtime_error&) {
+        while (unsaved_.size() > failed.kept()) unsaved_.pop_front();
+        for (const uint32_t iteration : unsaved_) iterations_.give_back(iteration);
+        lost = static_cast<int>(unsaved_.size());
     }
-    while (unsaved_.size() > failed.kept()) unsaved_.pop_front();
-    for (const uint32_t iteration : unsaved_) iterations_.give_back(iteration);
-    const auto lost = static_cast<int>(unsaved_.size());
     unsaved_.clear();
     update_total();
     return lost;
@@ -210,9 +213,13 @@ int Renderer::go_on_without_main(const char* reason) {
 
 void Renderer::update(std::shared_ptr<const Scene> scene, const PassSettings& pass, uint32_t first, uint32_t end) {
     rest();
-    const std::shared_ptr<const Scene> old = std::exchange(scene_, std::move(scene));  // lives until nobody looks at it
-    pass_ = pass;
-    film_ = Film(scene_->window(), pass.splats);
+    const std::shared_ptr<const Scene> old = scene_;  // lives until nobody looks at it
+    {
+        const std::lock_guard lock(mutex_);
+        scene_ = std::move(scene);
+        pass_ = pass;
+        film_ = Film(scene_->window(), pass.splats);
+    }
     iterations_.restart(first);
     end_ = end;
     unsaved_.clear();
