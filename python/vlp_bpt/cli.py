@@ -217,9 +217,8 @@ def _render(options: argparse.Namespace) -> int:
     renderer = Renderer(snapshot.scene, settings, first_iteration=first)
     warnings += renderer.warnings
     _warn(warnings)
-    if not options.quiet:
-        print(f"{options.file}: {_scene_text(snapshot.scene)}; memory: {total_text(renderer.memory)}", flush=True)
     with ProgressDisplay(quiet=options.quiet) as display:
+        _tell_memory(options, renderer)
         image = renderer.render(lambda progress: display.show(renderer, progress))
     _warn([warning for warning in renderer.warnings if warning not in warnings])  # of a device that has failed
     image.metadata["source"] = snapshot.metadata | {"file": options.file.name}
@@ -270,9 +269,9 @@ def _render_blend(options: argparse.Namespace, values: dict[str, Any]) -> int:
     with ProgressDisplay(quiet=options.quiet) as display:
 
         def show(renderer: Renderer, progress: Progress) -> None:
-            if not options.quiet and renderer not in told:
+            if renderer not in told:
                 told.append(renderer)
-                print(f"{options.file}: memory: {total_text(renderer.memory)}", flush=True)
+                _tell_memory(options, renderer)
             display.show(renderer, progress)
 
         result = render_blend(options.file, options.output, options.depth, options.frame, values, show)
@@ -455,6 +454,11 @@ def _capture(path: Path, frame: int | None, values: dict[str, Any]) -> tuple[Sna
 def _warn(warnings: list[str]) -> None:
     for warning in dict.fromkeys(warnings):
         print(f"vlp-bpt: warning: {warning}", file=sys.stderr)
+
+
+def _tell_memory(options: argparse.Namespace, renderer: Renderer) -> None:
+    if not options.quiet:
+        print(f"{options.file}: takes {total_text(renderer.memory)}", file=sys.stderr, flush=True)
 
 
 def _finish(output: Path, renderer: Renderer) -> int:
