@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/vec.h"
 #include "film/exact_sum.h"
 #include "film/guide.h"
 #include "film/window.h"
@@ -16,6 +17,18 @@ struct PixelSample {
     float rgba[4] = {0, 0, 0, 0};
 };
 
+// Sums a pixel: red, green, blue and alpha; with guides then the colour to be denoised, 3, which has each splat in one pixel,
+// albedo, 3, and normal + 1, 3, as no sum may be negative.
+VLP_HD constexpr uint32_t film_channels(bool guides) { return guides ? 13 : 4; }
+
+// What an iteration adds to channel `c` of a pixel, but for splats.
+VLP_HD inline float film_value(const PixelSample& sample, const GuideSample* guide, uint32_t c) {
+    if (c < 4) return sample.rgba[c];
+    if (c < 7) return sample.rgba[c - 4];
+    if (c < 10) return guide->albedo[c - 7];
+    return max_of(guide->normal[c - 10] + 1, 0.0f);  // unit vectors are rounded, too
+}
+
 class Film {
 public:
     // `splats`: light paths splat on it. `guides`: it keeps those of a denoiser.
@@ -25,14 +38,12 @@ public:
           guide_frame_(guides ? window.pixel_count() : 0),
           splats_(splats ? window.pixel_count() * 3 : 0),
           point_splats_(splats && guides ? window.pixel_count() * 3 : 0),
-          sums_(window.pixel_count() * (guides ? k_guided_channels : 4)) {}
+          sums_(window.pixel_count() * film_channels(guides)) {}
 
     const Window& window() const { return window_; }
     bool has_splats() const { return !splats_.empty(); }
     bool has_guides() const { return !guide_frame_.empty(); }
-    // Sums a pixel: red, green, blue and alpha; with guides then the colour to be denoised, 3, which has each splat in one
-    // pixel, albedo, 3, and normal + 1, 3, as no sum may be negative.
-    size_t channels() const { return has_guides() ? k_guided_channels : 4; }
+    size_t channels() const { return film_channels(has_guides()); }
     // The iteration under way, row by row from the bottom; counts only once it is committed.
     std::span<PixelSample> frame() { return frame_; }
     std::span<GuideSample> guide_frame() { return guide_frame_; }
@@ -62,8 +73,6 @@ public:
     }
 
 private:
-    static constexpr size_t k_guided_channels = 13;
-
     Window window_;
     uint64_t iterations_ = 0;
     std::vector<PixelSample> frame_;
