@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -141,11 +141,13 @@ class Cycles(Contestant):
 
 
 def race(
-    contestants: list[Contestant], seconds: float, rounds: int, observe: Callable[[Contestant, int], None]
+    contestants: Sequence[Contestant], instants: Sequence[float], observe: Callable[[Contestant, int], None]
 ) -> None:
-    """Each contestant gets `seconds` in `rounds` slices, in turns, the order turned round each time, so that whatever
-    else the machine does meets all alike. `observe(contestant, round)` is called after each slice, untimed."""
-    for index in range(rounds):
+    """Each contestant renders up to each of `instants` (seconds of its own) by turns, the order turned round each time,
+    so that whatever else the machine does meets all alike. One that is past an instant already, as samples are not
+    cut short, sits it out. `observe(contestant, index)` is called after each instant, untimed."""
+    for index, instant in enumerate(instants):
         for contestant in contestants if index % 2 == 0 else contestants[::-1]:
-            contestant.run(seconds / rounds)
+            if contestant.seconds < instant:
+                contestant.run(instant - contestant.seconds)
             observe(contestant, index)
