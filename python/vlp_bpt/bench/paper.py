@@ -133,7 +133,7 @@ def write(
 ) -> None:
     """iterations.csv, sweep.csv, plots and report.md; the page is printed too."""
     folder: Path = args.output
-    rows = [{"scene": c.scene, "device": c.device} | columns(p, "iterations") for c in curves for p in c.points]
+    rows = [{"scene": c.scene, "device": c.device, **columns(p, "iterations")} for c in curves for p in c.points]
     write_csv(folder / "iterations.csv", rows)
     if sweeps:
         write_csv(folder / "sweep.csv", sweep.rows(sweeps))
@@ -160,9 +160,9 @@ def report(
         "# The paper's experiment",
         f"{machine()}\n\nPAPER mode: L = 1, K = {k}, {args.size} pixels wide, {args.seconds:g} s a device; the SSIM is "
         f"against two halves of {reference_seconds:g} s each of the same lengths, weighted by the balance heuristic, "
-        "which changes the noise and not the mean. SSIM: sRGB-encoded, clipped, Gaussian window of sigma 1.5; SSIM_c is less "
-        "the reference's noise. The paper does not give the size of its pictures "
-        "nor its scene files, so its seconds and iterations are of like work, not of the same.",
+        "which changes the noise and not the mean. SSIM: sRGB-encoded, clipped, Gaussian window of sigma 1.5; SSIM_c "
+        "is less the reference's noise. The paper does not give the size of its pictures nor its scene files, so its "
+        "seconds and iterations are of like work, not of the same.",
         "## SSIM after the paper's times\n\n" + ssim_table(curves),
         "## Iterations\n\n" + iteration_table(curves),
         *([f"## Path lengths at equal time\n\n{sweep.page(sweeps, args.sweep_seconds)}"] if sweeps else []),

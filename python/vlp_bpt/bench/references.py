@@ -55,7 +55,8 @@ def our_halves(
     """Two independent pictures of ours (h, w, 3), top row first, of `seconds` each; made once and kept."""
     window = RenderSettings(**settings, samples=1 << 30, time_limit=seconds)
     kept = {key: value for key, value in window.to_dict().items() if key not in ("threads", "seed")}
-    key = fingerprint([native_file()], {"scene": scene_digest(scene), **kept})
+    film = scene.film.width, scene.film.height, scene.film.window  # the digest leaves it out
+    key = fingerprint([native_file()], {"scene": scene_digest(scene), "film": film, **kept})
 
     def make(index: int) -> NDArray[np.float32]:
         print(f"{name}: {window.mode} reference, half {index + 1} of 2, {seconds:.0f} s, kept in {folder}/", flush=True)
