@@ -41,9 +41,10 @@ def machine() -> str:
     """The devices, the processor and the versions, in one sentence."""
     names = ", ".join(f"{d['name']} ({d['isa']})" if d["kind"] == "CPU" else str(d["name"]) for d in devices())
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    busy = f" (load {load:.1f}: it had other work, so times are too long)" if load > 1.5 * (os.cpu_count() or 1) else ""
     return (
-        f"VLP-BPT {__version__} on {names}; {processor()}, {os.cpu_count()} cores, {platform.system()}, "
-        f"Python {platform.python_version()}; load {load:.1f} at the end."
+        f"VLP-BPT {__version__} on {names}; {processor()}, {os.cpu_count()} cores{busy}, {platform.system()}, "
+        f"Python {platform.python_version()}."
     )
 
 
