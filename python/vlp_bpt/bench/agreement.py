@@ -15,6 +15,7 @@ Doubles = NDArray[np.float64]
 REGIONS = 4  # along each side
 TOLERANCE = 0.01  # relative, of a region
 DARK = 0.1  # of the picture's mean: the least that a region's difference is held against
+LEAST_BATCH = 0.12  # of all samples
 SIGMAS = 5.0  # standard errors that noise is granted
 
 
@@ -70,16 +71,20 @@ def compare(batches: Sequence[tuple[Pixels, float]], halves: Halves, tolerance: 
 
 
 def increments(pictures: Sequence[tuple[Pixels, float]]) -> list[tuple[Pixels, float]]:
-    """The independent batches between running means: (mean so far, samples so far) -> (mean of the batch, samples)."""
+    """The independent batches between running means: (mean so far, samples so far) -> (mean of the batch, samples).
+
+    Batches hold at least LEAST_BATCH of all samples, the first ones together: renderers that go over the picture piece
+    by piece have not been everywhere in a short one.
+    """
+    least = LEAST_BATCH * pictures[-1][1] if pictures else 0.0
     result: list[tuple[Pixels, float]] = []
-    before: tuple[Pixels, float] | None = None
+    mean_before, samples_before = np.zeros(()), 0.0
     for mean, samples in pictures:
-        if before is None:
-            result.append((mean, samples))
-        elif samples > before[1]:
-            count = samples - before[1]
-            result.append(((mean * samples - before[0] * before[1]) / count, count))
-        before = mean, samples
+        count = samples - samples_before
+        if count < least:
+            continue
+        result.append(((mean * samples - mean_before * samples_before) / count, count))
+        mean_before, samples_before = mean, samples
     return result
 
 

@@ -30,7 +30,7 @@ from .scenes import find_scene, load_scene, mesh_variant
 SCENES = ["cornell_box", "sierpinski", "caustics", "indirect_room", "million"]
 LONGEST = 64  # surface hits of a path, where roulette ends it
 MESH_LEVELS = 5  # of the meshes that stand for spheres in Cycles
-OWN_BATCHES = 8  # of a reference of a renderer's own
+BATCHES = 8  # of each renderer's time, for its noise
 BOX = {"filter": "BOX", "filter_width": 1.0}  # the one filter that all have
 ENGINES = {  # by which a peer is named on the command line: its module, and how it is installed
     "vlp-bpt": ("vlp_bpt", ""),
@@ -155,11 +155,16 @@ def bench_scene(
                 outcome.seconds.append(remote.seconds)
             outcome.state = remote.state
 
-        race(ready, ladder(args.seconds), observe)
+        race(ready, instants(args.seconds), observe)
     for contestant in contestants(path, scene, args, seed=1):
         if contestant.name in outcomes:
             conclude(outcomes[contestant.name], contestant, halves, args)
     return list(outcomes.values())
+
+
+def instants(seconds: float) -> list[float]:
+    """Where the pictures are judged, and eighths of the time, of which batches are made."""
+    return sorted({*ladder(seconds), *(seconds * (i + 1) / BATCHES for i in range(BATCHES))})
 
 
 def conclude(outcome: Outcome, again: Contestant, halves: Halves, args: argparse.Namespace) -> None:
@@ -171,8 +176,11 @@ def conclude(outcome: Outcome, again: Contestant, halves: Halves, args: argparse
     if outcome.agreement is not None and not outcome.agreement.agrees:
         halves = own_halves(again, args.reference_seconds or 5 * args.seconds)
         outcome.own = True
+    wanted = ladder(args.seconds)
     for (picture, samples), seconds in zip(outcome.pictures, outcome.seconds, strict=True):
-        add_point(outcome.points, judge(picture, halves, seconds, int(samples)))
+        if seconds >= wanted[0]:  # the first one at or after each step of the ladder
+            add_point(outcome.points, judge(picture, halves, seconds, int(samples)))
+            wanted = [step for step in wanted if step > seconds] or [float("inf")]
     outcome.pictures.clear()
 
 
@@ -182,8 +190,8 @@ def own_halves(contestant: Contestant, seconds: float) -> Halves:
     pictures = []
     with Remote(contestant) as remote:
         remote.prepare()
-        for _ in range(OWN_BATCHES):
-            remote.run(2 * seconds / OWN_BATCHES)
+        for _ in range(BATCHES):
+            remote.run(2 * seconds / BATCHES)
             pictures.append((remote.picture(), float(remote.eye_samples)))
     batches = increments(pictures)
     return joined(batches[0::2]), joined(batches[1::2])
