@@ -20,6 +20,7 @@ from vlp_bpt.settings import RenderSettings
 from . import cycles, luxcore, mitsuba
 
 Pixels = NDArray[np.float64]
+SPARED = 4  # times what a launch of Mitsuba's costs without samples: no slice is shorter
 CYCLES_SEQUENCE = 1 << 16  # samples of the one sequence that all slices belong to
 
 
@@ -41,6 +42,11 @@ class Contestant:
     def iterations(self) -> int | None:
         """Iterations so far, None for a renderer that has none."""
         return None
+
+    @property
+    def shortest(self) -> float:
+        """Seconds of the shortest slice that does not waste time."""
+        return 0.0
 
     @property
     def notes(self) -> list[str]:
@@ -189,6 +195,10 @@ class Mitsuba(Contestant):
     def window(self) -> str:
         return f"{mitsuba.variant()}, max_depth {self.scatterings + 1}"
 
+    @property
+    def shortest(self) -> float:
+        return SPARED * self._overhead
+
     def prepare(self) -> None:
         self._loaded = mitsuba.load(self.scene, self.scatterings)
         mitsuba.launch(self._loaded, 1, 0)  # compiles
@@ -271,9 +281,11 @@ def race(
 ) -> None:
     """Each contestant renders up to each of `instants` (seconds of its own) by turns, the order turned round each time,
     so that whatever else the machine does meets all alike. One that is past an instant already, as samples are not
-    cut short, sits it out. `observe(contestant, index)` is called after each instant, untimed."""
+    cut short, or for which the slice would be too short, sits it out. `observe(contestant, index)` is called after
+    each instant, untimed."""
     for index, instant in enumerate(instants):
         for contestant in contestants if index % 2 == 0 else contestants[::-1]:
-            if contestant.seconds < instant:
-                contestant.run(instant - contestant.seconds)
+            left = instant - contestant.seconds
+            if left > 0 and (left >= contestant.shortest or index == len(instants) - 1):
+                contestant.run(left)
             observe(contestant, index)

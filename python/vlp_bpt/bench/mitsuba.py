@@ -52,7 +52,7 @@ FAR = 1e4  # radii of the scene
 BACK = 1e-4  # of a mesh's extent
 SMOOTH = 0.0038  # Blender's roughness below which a lobe is a delta distribution
 MOST_ALPHA = 0.25
-PASS = 1 << 24  # most samples of one launch: it cannot be interrupted
+PASS = 1 << 26  # most samples of one launch: it cannot be interrupted
 
 
 class NotConvertible(Error):

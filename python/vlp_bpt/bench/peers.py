@@ -30,6 +30,7 @@ from .scenes import find_scene, load_scene, mesh_variant
 SCENES = ["cornell_box", "sierpinski", "caustics", "indirect_room", "million"]
 LONGEST = 64  # surface hits of a path, where roulette ends it
 MESH_LEVELS = 5  # of the meshes that stand for spheres in Cycles
+FEWEST = 4  # eye samples a pixel, without which a picture is not compared
 BATCHES = 8  # of each renderer's time, for its noise
 BOX = {"filter": "BOX", "filter_width": 1.0}  # the one filter that all have
 ENGINES = {  # by which a peer is named on the command line: its module, and how it is installed
@@ -150,7 +151,7 @@ def bench_scene(
         def observe(remote: Contestant, _: int) -> None:
             assert isinstance(remote, Remote)
             outcome = outcomes[remote.name]
-            if not outcome.seconds or remote.seconds > outcome.seconds[-1]:
+            if remote.seconds > (outcome.seconds[-1] if outcome.seconds else 0.0):
                 outcome.pictures.append((remote.picture(), float(remote.eye_samples)))
                 outcome.seconds.append(remote.seconds)
             outcome.state = remote.state
@@ -171,7 +172,9 @@ def conclude(outcome: Outcome, again: Contestant, halves: Halves, args: argparse
     """Agreement and errors. A renderer that makes another picture is held against itself: two long renders, `again`
     and one with the next seed."""
     batches = increments(outcome.pictures)
-    outcome.agreement = compare(batches, halves) if len(batches) > 1 else None
+    height, width, _ = halves[0].shape
+    if len(batches) > 1 and outcome.pictures[-1][1] >= FEWEST * height * width:
+        outcome.agreement = compare(batches, halves)
     print(f"{outcome.scene}: {outcome.name}: {outcome.agreement or 'too few samples to compare'}", flush=True)
     if outcome.agreement is not None and not outcome.agreement.agrees:
         halves = own_halves(again, args.reference_seconds or 5 * args.seconds)

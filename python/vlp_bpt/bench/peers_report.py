@@ -87,7 +87,7 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     head += [f"s to {level:g}" for level in LEVELS]
     lines = []
     for outcome in outcomes:
-        agreement = "not compared" if outcome.agreement is None else str(outcome.agreement)
+        agreement = "too few samples to tell" if outcome.agreement is None else str(outcome.agreement)
         notes = "".join(f"; {note}" for note in outcome.state.notes)
         line = [outcome.name + ("*" if outcome.own else ""), agreement + notes]
         if outcome.points:
@@ -110,7 +110,7 @@ def settings() -> dict[str, str]:
         "sampling, path guiding, clamps and denoiser off; its Sobol sequences. Spheres are smooth meshes, as its point "
         "clouds are wrong inside glass.",
         f"Mitsuba{_version('mitsuba')}": f"{mitsuba.variant()}, `path`, or `volpath` where lamps have to let light "
-        "through; independent sampler, launches of up to 16 M samples.",
+        "through; independent sampler, launches of up to 67 M samples.",
         f"LuxCore PATHCPU{_version('pyluxcore')}": "Sobol sampler, not adaptive; its own roulette.",
         "LuxCore BIDIRCPU": f"as PATHCPU; walks of up to {LUXCORE_DEPTH} hits from either side without roulette, "
         "as with it the picture is too bright.",

@@ -28,6 +28,7 @@ class State:
     eye_samples: int = 0
     rates: list[float] = field(default_factory=list)
     window: str = ""
+    shortest: float = 0.0
     notes: list[str] = field(default_factory=list)
     processor: float = 0.0
     wall: float = 0.0
@@ -66,6 +67,10 @@ class Remote(Contestant):
     @property
     def window(self) -> str:
         return self.state.window
+
+    @property
+    def shortest(self) -> float:
+        return self.state.shortest
 
     @property
     def notes(self) -> list[str]:
@@ -126,7 +131,8 @@ def _answer(inner: Contestant, state: State, command: tuple[Any, ...]) -> Any:
         state.processor += time.process_time() - processor
         state.wall += time.perf_counter() - wall
     state.seconds, state.eye_samples, state.rates = inner.seconds, inner.eye_samples, inner.rates
-    state.window, state.notes, state.memory = inner.window, inner.notes, peak_memory()
+    state.window, state.shortest, state.notes = inner.window, inner.shortest, inner.notes
+    state.memory = peak_memory()
     return state
 
 
