@@ -204,13 +204,13 @@ def draw(folder: Path, curves: list[Curve], sweeps: dict[str, list[sweep.Cell]])
     for scene in scenes:
         quoted = QUOTED.get(scene, Quoted({}, {}))
         mine = [c for c in curves if c.scene == scene]
-        lines = [
-            plots.Series(c.device, [0.0, *(p.seconds for p in c.points)], [0.0, *(p.samples for p in c.points)])
-            for c in mine
+        lines = [plots.Series(c.device, [p.seconds for p in c.points], [p.samples for p in c.points]) for c in mine]
+        lines += [  # straight through the one point that the text gives
+            plots.Series(f"paper: {device}", [1, seconds], [count / seconds, count], "--")
+            for device, (seconds, count) in quoted.iterations.items()
         ]
-        lines += [plots.Series(f"paper: {d}", [0, s], [0, n], "--") for d, (s, n) in quoted.iterations.items()]
-        note = "" if quoted.iterations else "the paper's text gives no iterations for this scene"
-        counts.append((plots.Axes(scene, "seconds", "iterations", note=note), lines))
+        note = "PC1: no figure in the paper's text" if quoted.iterations else "no figures in the paper's text"
+        counts.append((plots.Axes(scene, "seconds", "iterations", log_x=True, log_y=True, note=note), lines))
         lines = [plots.Series(c.device, [p.seconds for p in c.points], [p.ssim_c for p in c.points]) for c in mine]
         if quoted.ssim:
             lines.append(plots.Series("paper: GTX 780", list(quoted.ssim), list(quoted.ssim.values()), "s--", "gray"))

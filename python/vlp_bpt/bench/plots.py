@@ -10,6 +10,8 @@ from typing import Any
 
 from vlp_bpt.errors import Error
 
+LOSSES = (0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.07, 0.03, 0.01, 0.005, 0.002, 0.001)  # ticks of 1 - y
+
 
 @dataclass(frozen=True)
 class Series:
@@ -70,16 +72,25 @@ def _draw(panel: Any, axes: Axes, series: Sequence[Series]) -> None:
     if axes.log_y or axes.loss:
         panel.set_yscale("log")
     if axes.loss:
-        ticks = (0.5, 0.3, 0.2, 0.1, 0.07, 0.03, 0.01, 0.005, 0.002, 0.001)
         low, high = panel.get_ylim()
-        panel.set_yticks([t for t in ticks if low <= t <= high], minor=False)
+        ticks = _spread([share for share in LOSSES if low <= share <= high], (high / low) ** 0.05)
+        panel.set_yticks(ticks, minor=False)
         panel.set_yticks([], minor=True)
-        panel.set_yticklabels([f"{1 - t:.3g}" for t in ticks if low <= t <= high])
+        panel.set_yticklabels([f"{1 - tick:.3g}" for tick in ticks])
         panel.invert_yaxis()
     if axes.note:
-        panel.text(0.02, 0.02, axes.note, transform=panel.transAxes, fontsize=7, va="bottom")
+        panel.text(0.98, 0.02, axes.note, transform=panel.transAxes, fontsize=7, ha="right", va="bottom")
     if series:
         panel.legend(fontsize=7)
+
+
+def _spread(ticks: Sequence[float], factor: float) -> list[float]:
+    """Falling ticks of which each is at least so many times below the one before."""
+    kept: list[float] = []
+    for tick in ticks:
+        if not kept or tick * factor <= kept[-1]:
+            kept.append(tick)
+    return kept
 
 
 def _pyplot() -> Any:
