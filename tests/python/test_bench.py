@@ -311,7 +311,10 @@ def test_the_sweep_parts_noise_from_lost_light() -> None:
 
 
 def grown(axis: str, sizes: list[int], cost: Any) -> list[growth.Sample]:
-    return [growth.Sample(axis, n, cost(n), cost(n), cost(n), 1, int(1e6 * cost(n)), int(1e6 * cost(n))) for n in sizes]
+    return [
+        growth.Sample(axis, n, cost(n), cost(n), cost(n), cost(n), 1, int(1e6 * cost(n)), int(1e6 * cost(n)))
+        for n in sizes
+    ]
 
 
 def test_growth_worse_than_n_log_n_is_found() -> None:

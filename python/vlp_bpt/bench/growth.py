@@ -28,7 +28,7 @@ from . import plots
 from .growth_scenes import balls_and_lamps
 from .measure import slope
 from .remote import peak_memory
-from .report import Cell, machine, markdown_table, number, write_csv
+from .report import Cell, busy, machine, markdown_table, number, write_csv
 
 SLACK = 0.1  # by which an exponent over n log n may exceed 1 before it is named: the fit's own error
 FEW_TRIANGLES, SIDE = 10_000, 256  # of the scenes in which something else grows
@@ -38,13 +38,15 @@ PROJECTED = (4, 8, 16, 64)  # threads
 @dataclass(frozen=True)
 class Sample:
     """One size. build: seconds of uploading the scene and building its hierarchy; iteration: seconds of the fastest of
-    `iterations`, as whatever else the machine does can only slow it down; processor: seconds of all threads together
-    for one; core: bytes that the native core accounts for; process: most bytes that the process had."""
+    `iterations`, as whatever else the machine does can only slow it down; build_processor, processor: seconds of all
+    threads together for the build and for one iteration; core: bytes that the native core accounts for; process: most
+    bytes that the process had."""
 
     axis: str
     size: int
     build: float
     iteration: float
+    build_processor: float
     processor: float
     iterations: int
     core: int
@@ -69,7 +71,8 @@ class Fit:
 COSTS: dict[str, tuple[str, Callable[[Sample], float]]] = {
     "build": ("building, s", lambda s: s.build),
     "iteration": ("one iteration, s", lambda s: s.iteration),
-    "processor": ("its processor time, s", lambda s: s.processor),
+    "build_processor": ("building, processor time, s", lambda s: s.build_processor),
+    "processor": ("one iteration, processor time, s", lambda s: s.processor),
     "core": ("memory of the core, MiB", lambda s: s.core / 2**20),
     "process": ("peak memory of the process, MiB", lambda s: s.process / 2**20),
 }
@@ -168,14 +171,16 @@ def _measure(
 
 def measure(axis: str, size: int, scene: Scene, threads: int, seconds: float) -> Sample:
     """Iterations for at least so many seconds, after a first one, which warms up and does not count."""
+    started = time.process_time()
     renderer = Renderer(scene, RenderSettings(samples=1 << 30, threads=threads))
+    build_processor = time.process_time() - started
     renderer.iterate(1)
-    processor = time.process_time()
+    started = time.process_time()
     clock = [renderer.statistics.seconds]
     while clock[-1] - clock[0] < seconds:
         renderer.iterate(1)
         clock.append(renderer.statistics.seconds)
-    processor = time.process_time() - processor
+    processor = time.process_time() - started
     fastest, taken = min(b - a for a, b in pairwise(clock)), renderer.statistics
     iterations = len(clock) - 1
     return Sample(
@@ -183,6 +188,7 @@ def measure(axis: str, size: int, scene: Scene, threads: int, seconds: float) ->
         size,
         taken.build_seconds,
         fastest,
+        build_processor,
         processor / iterations,
         iterations,
         taken.memory_bytes,
@@ -227,7 +233,8 @@ def _row(sample: Sample) -> dict[str, Cell]:
         "size": sample.size,
         "build_seconds": sample.build,
         "iteration_seconds": sample.iteration,
-        "processor_seconds": sample.processor,
+        "build_processor_seconds": sample.build_processor,
+        "iteration_processor_seconds": sample.processor,
         "iterations": sample.iterations,
         "core_bytes": sample.core,
         "process_bytes": sample.process,
@@ -270,6 +277,8 @@ def _threads(samples: Sequence[Sample]) -> str:
     if serial is None:
         return ""
     projected = ", ".join(f"{p}: {1 / (serial + (1 - serial) / p):.1f}" for p in PROJECTED)
+    if busy():
+        return "The machine had other work: how well threads share an iteration cannot be told."
     return (
         f"Amdahl: {serial:.1%} of an iteration is serial. Projected speed over one thread, which supposes that memory "
         f"keeps up: {projected}."
@@ -285,7 +294,10 @@ def draw(folder: Path, samples: Sequence[Sample]) -> list[str]:
             continue
         sizes = [float(row.size) for row in rows]
         panels = []
-        for title, costs in (("time, s", ("build", "iteration", "processor")), ("memory, MiB", ("core", "process"))):
+        for title, costs in (
+            ("time, s", ("build", "iteration", "build_processor", "processor")),
+            ("memory, MiB", ("core", "process")),
+        ):
             lines = [plots.Series(COSTS[c][0], sizes, [COSTS[c][1](row) for row in rows]) for c in costs]
             if axis != "threads":
                 last = max(line.y[-1] for line in lines) / (sizes[-1] * np.log(sizes[-1] + 1))

@@ -40,12 +40,16 @@ def number(value: float | None, digits: int = 3) -> str:
 def machine() -> str:
     """The devices, the processor and the versions, in one sentence."""
     names = ", ".join(f"{d['name']} ({d['isa']})" if d["kind"] == "CPU" else str(d["name"]) for d in devices())
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
-    busy = f" (load {load:.1f}: it had other work, so times are too long)" if load > 1.5 * (os.cpu_count() or 1) else ""
+    other = " (busy with other work: times are too long)" if busy() else ""
     return (
-        f"VLP-BPT {__version__} on {names}; {processor()}, {os.cpu_count()} cores{busy}, {platform.system()}, "
+        f"VLP-BPT {__version__} on {names}; {processor()}, {os.cpu_count()} cores{other}, {platform.system()}, "
         f"Python {platform.python_version()}."
     )
+
+
+def busy() -> bool:
+    """Whether this machine, on which a benchmark has just kept all cores at work, has had much more to do than that."""
+    return hasattr(os, "getloadavg") and os.getloadavg()[0] > 1.5 * (os.cpu_count() or 1)
 
 
 def processor() -> str:
