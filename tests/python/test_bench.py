@@ -220,9 +220,10 @@ def test_missing_peers_are_named_with_what_installs_them(
         "luxcore is missing and takes no part: pip install pyluxcore, or make bench-peers"
     ]
     words = ["--scenes", str(snapshot), "--size", "24", "--seconds", "0.2", "--reference-seconds", "0.2", "--no-plots"]
-    assert main(["peers", *words, "--peers", "vlp-bpt", "luxcore"]) == 0
+    assert main(["peers", *words, "--peers", "vlp-bpt", "cycles", "luxcore"]) == 0
     page = Path("out/bench-peers/report.md").read_text()
     assert "- luxcore is missing" in page
+    assert "Cycles: renders .blend files alone" in page
     rows = read_csv(Path("out/bench-peers/results.csv"))
     assert [(row["renderer"], row["agrees"]) for row in rows] == [("VLP-BPT", "True")]
     assert "same picture" in capsys.readouterr().out

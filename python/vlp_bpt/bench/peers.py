@@ -136,6 +136,8 @@ def bench_scene(
 ) -> list[Outcome]:
     """Race all on one scene, then judge their pictures. Who cannot render it gets a line in `left_out`."""
     name = path.stem
+    if "cycles" in args.peers and path.suffix != ".blend":
+        left_out.append(f"{name}: Cycles: renders .blend files alone")
     with ExitStack() as stack:
         ready: list[Remote] = []
         for contestant in contestants(path, scene, args):
