@@ -63,6 +63,7 @@ def test_seconds_to_an_ssim_outside_of_the_points_say_so() -> None:
     assert str(before) == "<1"
     assert seconds_to(points, 1 - 1e-6) is None  # thousands of times further than measured
     assert seconds_to([points[1], points[0]], 0.999) is None  # gets worse
+    assert seconds_to(power_law([1, 2], exponent=1e-6), 0.998) is None  # hardly gets better
 
 
 def test_ssim_at_a_time_or_a_number_of_samples() -> None:

@@ -97,17 +97,17 @@ def seconds_to(points: Sequence[Point], level: float) -> Crossing | None:
         return Crossing(times[0], "<")
     for i in range(1, len(points)):
         if gaps[i] <= wanted:
-            return Crossing(_log_line(times[i - 1 : i + 1], gaps[i - 1 : i + 1], wanted), "")
+            return Crossing(math.exp(_log_time(times[i - 1 : i + 1], gaps[i - 1 : i + 1], wanted)), "")
     if len(points) < 2 or gaps[-1] >= gaps[-2]:
         return None
-    seconds = _log_line(times[-2:], gaps[-2:], wanted)
-    return Crossing(seconds, "~") if seconds <= FURTHEST * times[-1] else None
+    log_seconds = _log_time(times[-2:], gaps[-2:], wanted)
+    return Crossing(math.exp(log_seconds), "~") if log_seconds <= math.log(FURTHEST * times[-1]) else None
 
 
-def _log_line(times: Sequence[float], gaps: Sequence[float], wanted: float) -> float:
-    """The time at which the line through two points, in logarithms, has the gap that is wanted."""
+def _log_time(times: Sequence[float], gaps: Sequence[float], wanted: float) -> float:
+    """The logarithm of the time at which the line through two points, in logarithms, has the gap that is wanted."""
     share = math.log(gaps[0] / wanted) / math.log(gaps[0] / gaps[1])
-    return float(math.exp(math.log(times[0]) + share * math.log(times[1] / times[0])))
+    return math.log(times[0]) + share * math.log(times[1] / times[0])
 
 
 def slope(x: Sequence[float], y: Sequence[float]) -> float:
