@@ -183,6 +183,8 @@ def conclude(outcome: Outcome, again: Contestant, halves: Halves, args: argparse
         outcome.own = True
     wanted = ladder(args.seconds)
     for (picture, samples), seconds in zip(outcome.pictures, outcome.seconds, strict=True):
+        if samples < height * width:
+            continue  # parts of the picture are still black
         # the first one at or after each step of the ladder, and the last, which may lie a little before its end
         if seconds >= wanted[0] or seconds == outcome.seconds[-1]:
             add_point(outcome.points, judge(picture, halves, seconds, int(samples)))
