@@ -70,7 +70,7 @@ test-slow: build .venv/.peers ## the tests that take minutes each, beside Cycles
 .PHONY: bench
 bench: build ## speed and error over time beside Cycles, and a short form of the paper's experiment (half an hour)
 	.venv/bin/vlp-bpt bench
-	.venv/bin/vlp-bpt bench paper --seconds 5 --reference-seconds 8 --sweep-seconds 1 --sweep-k 3 5 --output out/bench
+	.venv/bin/vlp-bpt bench paper --seconds 5 --reference-seconds 6 --sweep-seconds 1 --sweep-k 3 5 --output out/bench
 
 .PHONY: bench-paper
 bench-paper: build ## the paper's experiment: out/bench-paper/report.md (half an hour)

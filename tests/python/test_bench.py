@@ -113,6 +113,11 @@ def test_a_picture_upside_down_does_not_agree() -> None:
     assert not agreement.compare(batches_of(PICTURE[::-1], 0.1, 8), HALVES).agrees  # type: ignore[arg-type]
 
 
+def test_few_batches_raise_no_false_alarms() -> None:
+    for seed in range(200):
+        assert agreement.compare(batches_of(PICTURE, 1.0, 2, seed), HALVES).agrees  # type: ignore[arg-type]
+
+
 def test_noise_is_told_from_agreement() -> None:
     found = agreement.compare(batches_of(PICTURE, 4.0, 8), HALVES)  # type: ignore[arg-type]
     assert found.agrees
@@ -220,7 +225,7 @@ def test_missing_peers_are_named_with_what_installs_them(
     assert peers.missing(["vlp-bpt", "luxcore"]) == [
         "luxcore is missing and takes no part: pip install pyluxcore, or make bench-peers"
     ]
-    words = ["--scenes", str(snapshot), "--size", "24", "--seconds", "0.2", "--reference-seconds", "0.2", "--no-plots"]
+    words = ["--scenes", str(snapshot), "--size", "24", "--seconds", "0.8", "--reference-seconds", "0.8", "--no-plots"]
     assert main(["peers", *words, "--peers", "vlp-bpt", "cycles", "luxcore"]) == 0
     page = Path("out/bench-peers/report.md").read_text()
     assert "- luxcore is missing" in page

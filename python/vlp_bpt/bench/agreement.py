@@ -54,9 +54,10 @@ def compare(batches: Sequence[tuple[Pixels, float]], halves: Halves, tolerance: 
     first, second = (_regions(half) for half in halves)
     ours = (first + second) / 2
     level = np.maximum(ours, DARK * ours.mean())
-    # One difference of halves says little about a region; all regions together do, in proportion to their light.
-    relative = np.mean(((first - second) / 2 / level) ** 2)
-    noise = np.sqrt(spread / level**2 + relative)
+    # One difference of halves, or a few batches, say little about a region; all regions together do, in proportion to
+    # their light. A region of which its batches say that it is noisier is taken to be so.
+    relative = spread / level**2
+    noise = np.sqrt(np.maximum(relative, relative.mean()) + np.mean(((first - second) / 2 / level) ** 2))
     difference = (theirs - ours) / level
     excess = np.abs(difference) - SIGMAS * noise
     worst = np.unravel_index(int(np.argmax(excess)), excess.shape)
