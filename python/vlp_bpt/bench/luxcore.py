@@ -5,8 +5,8 @@ together:
 
 - **Lamps** neither block nor reflect light here; in LuxCore they are surfaces. One that hangs right before a diffuse
   surface reflects as that surface does, since it hides it. Elsewhere lamps let light through where all else is diffuse:
-  LuxCore then does not show them, but lights by them (BIDIRCPU loses what walks would find that run into them: 2 % of
-  the indirect room); or else they are black.
+  LuxCore then does not show them, but lights by them (BIDIRCPU's indirect room is 2 % too dark with such a lamp); or
+  else they are black.
 - **Spheres** are instances of one smooth mesh: LuxCore has no spheres.
 - **Rough mirrors** here reflect their colour at every angle; LuxCore's metal turns white at grazing angles.
 """
