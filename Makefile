@@ -66,12 +66,25 @@ test-python311: .bootstrap/.uv-$(UV_VERSION) build
 
 # Debian's libllvm19 makes Mitsuba several times faster; it works without.
 .PHONY: test-slow
-test-slow: build .venv/.peers ## the tests that take minutes each, beside Cycles and Mitsuba
+test-slow: build .venv/.peers ## the tests that take minutes each, beside Cycles, Mitsuba and LuxCore
 	$(PY) -m pytest tests --ignore=tests/blender --ignore=tests/gpu --slow -m slow $(PYTEST_ARGS)
 
 .PHONY: bench
-bench: build ## speed and error over time, beside Cycles
+bench: build ## speed and error over time beside Cycles, and a short form of the paper's experiment (half an hour)
 	.venv/bin/vlp-bpt bench
+	.venv/bin/vlp-bpt bench paper --seconds 5 --reference-seconds 6 --sweep-seconds 1 --sweep-k 3 5 --output out/bench
+
+.PHONY: bench-paper
+bench-paper: build ## the paper's experiment: out/bench-paper/report.md (half an hour)
+	.venv/bin/vlp-bpt bench paper
+
+.PHONY: bench-peers
+bench-peers: build .venv/.peers ## beside Cycles, Mitsuba and LuxCore: out/bench-peers/report.md (an hour)
+	.venv/bin/vlp-bpt bench peers
+
+.PHONY: bench-growth
+bench-growth: build ## how costs grow with triangles, lights, pixels and threads: out/bench-growth/report.md (minutes)
+	.venv/bin/vlp-bpt bench growth
 
 .PHONY: bench-rays
 bench-rays: build ## rays a second, beside Embree's where its headers are (Debian: libembree-dev), and steps a ray
