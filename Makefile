@@ -73,6 +73,13 @@ test-slow: build .venv/.peers ## the tests that take minutes each, beside Cycles
 bench: build ## speed and error over time, beside Cycles
 	.venv/bin/vlp-bpt bench
 
+.PHONY: bench-rays
+bench-rays: build ## rays a second, beside Embree's where its headers are (Debian: libembree-dev), and steps a ray
+	@$(BIN)/cmake -DVLP_BENCH=ON build/venv >build/configure.log || { cat build/configure.log >&2; exit 1; }
+	@$(BIN)/cmake --build build/venv --target vlp_rays vlp_ray_visits
+	build/venv/vlp_rays $(RAYS_ARGS)
+	build/venv/vlp_ray_visits
+
 .PHONY: extension
 extension: wheel ## dist/vlp_bpt-VERSION-PLATFORM.zip, to be installed in Blender
 	$(PY) addon/build_extension.py dist/vlp_bpt-$(VERSION)-cp311-abi3-*.whl --output dist

@@ -24,6 +24,10 @@ class VLP_BPT_RenderEngine(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene: Any = None, renderlayer: Any = None) -> None:
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
+        if scene.vlp_bpt.denoise:  # under Cycles' names
+            self.register_pass(scene, renderlayer, "Noisy Image", 4, "RGBA", "COLOR")
+            self.register_pass(scene, renderlayer, "Denoising Albedo", 3, "RGB", "COLOR")
+            self.register_pass(scene, renderlayer, "Denoising Normal", 3, "XYZ", "VECTOR")
 
     def render(self, depsgraph: Any) -> None:
         final.render(self, depsgraph)

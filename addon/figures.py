@@ -15,6 +15,7 @@ def lines(
     rows = [
         ("Iterations", f"{statistics.iterations:,}"),
         ("Render Time", duration(statistics.seconds)),
+        *([("Denoising", duration(statistics.denoise_seconds))] if statistics.denoise_seconds else []),
         ("Total Time", duration(total_seconds)),
         ("Camera Paths", f"{statistics.eye_samples_per_second / 1e6:.2f} M/s"),
         ("Light Paths", f"{statistics.light_paths_per_second / 1e6:.2f} M/s"),

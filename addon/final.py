@@ -91,6 +91,7 @@ def _render(engine: Any, depsgraph: Any, picture: Picture, started: float) -> No
     scene = export_scene(
         depsgraph, width=engine.resolution_x, height=engine.resolution_y, window=picture.window, notes=notes
     )
+    _without_missing_denoiser(settings, notes)
     if picture.views > 1:
         notes.warn("Stereoscopy is not there yet: every view gets the same picture")
     if _Break(engine).is_set():
@@ -100,13 +101,23 @@ def _render(engine: Any, depsgraph: Any, picture: Picture, started: float) -> No
     _forget_reports(engine, depsgraph)
     _report(engine, renderer, notes)
     try:
-        renderer.render(_Watcher(engine, depsgraph, renderer, picture, len(notes.warnings)), _Break(engine))
+        image = renderer.render(_Watcher(engine, depsgraph, renderer, picture, len(notes.warnings)), _Break(engine))
     except vlp_bpt.Cancelled:
         return
     finally:
         _report(engine, renderer, notes)  # of a device that has failed
-    picture.fill(renderer)
+    picture.fill(image.pixels, image.layers)
     _record(engine, depsgraph, renderer, time.perf_counter() - started, notes.warnings)
+
+
+def _without_missing_denoiser(settings: Any, notes: Notes) -> None:
+    """The picture stays noisy, with a warning, where this Blender has no denoiser."""
+    if settings.denoise:
+        try:
+            core.load("vlp_bpt.denoise").load()
+        except core.load("vlp_bpt.errors").DeviceError as error:
+            notes.warn(f"The picture stays noisy: {error}")
+            settings.denoise = False
 
 
 class Picture:
@@ -137,20 +148,20 @@ class Picture:
     def show(self, renderer: Any) -> None:
         """Fills the picture and has Blender draw it."""
         began = time.perf_counter()
-        self.fill(renderer)
+        width, height = self._size
+        if self._pixels is None:
+            self._pixels = np.empty((height, width, 4), np.float32)
+        self.fill(renderer.read(self._pixels), renderer.layers())
         self._engine.update_result(self._result)
         self._shown = time.perf_counter()
         self._cost = self._shown - began
 
-    def fill(self, renderer: Any) -> None:
-        """Writes the mean of the renderer's complete iterations: rows from the bottom, as Blender's."""
-        width, height = self._size
-        if self._pixels is None:
-            self._pixels = np.empty((height, width, 4), np.float32)
-        flat = renderer.read(self._pixels).reshape(-1)
+    def fill(self, pixels: Any, layers: dict[str, Any]) -> None:
+        """Writes the picture, (height, width, 4), and further passes by name: rows from the bottom, as Blender's."""
+        images = {"Combined": pixels, "Noisy Image": pixels} | layers
         for render_pass in self._result.layers[0].passes:
-            if render_pass.name == "Combined":
-                render_pass.rect.foreach_set(flat)
+            if render_pass.name in images:
+                render_pass.rect.foreach_set(images[render_pass.name].reshape(-1))
         self._filled = True
 
     def end(self, cancelled: bool) -> None:
@@ -201,7 +212,9 @@ class _Watcher:
         self._engine.update_progress((self._layer + progress.fraction) / self._layers)
         if progress.fraction >= 1 or time.perf_counter() - self._told >= self._pause:
             self._told = time.perf_counter()
-            self._engine.update_stats("", figures.status(taken, progress) + self._warnings)
+            ends = progress.fraction >= 1 and self._renderer.settings.denoise
+            text = "Denoising" if ends else figures.status(taken, progress)
+            self._engine.update_stats("", text + self._warnings)
         megabytes = taken.memory_bytes / 2**20
         self._engine.update_memory_stats(memory_used=megabytes, memory_peak=megabytes)
         if progress.picture and self._picture.due():

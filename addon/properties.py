@@ -66,6 +66,12 @@ def apply_mode(self: Any, context: Any) -> None:
         setattr(self, name, value)
 
 
+def update_passes(self: Any, context: Any) -> None:
+    """Shows the scene's passes, which depend on a setting, to the compositor."""
+    for layer in self.id_data.view_layers:
+        layer.update_render_passes()
+
+
 _DEFAULTS = {
     "light_path_length": 12,
     "eye_path_length": 16,
@@ -214,6 +220,19 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
         min=0.01,
         max=10.0,
         subtype="PIXEL",
+    )
+    denoise: bpy.props.BoolProperty(
+        name="Denoise",
+        description="Removes the noise of the finished picture with Open Image Denoise. The picture as it was rendered "
+        "and what guides the denoiser are kept as passes",
+        default=False,
+        update=update_passes,
+    )
+    denoise_prefilter: bpy.props.BoolProperty(
+        name="Prefilter Guides",
+        description="Denoises the colours and normals that guide the denoiser first. Takes several times as long, and "
+        "leaves less error; off is good enough for quick looks",
+        default=True,
     )
     device: bpy.props.EnumProperty(
         name="Device", description="What computes the picture", items=DEVICES, default="AUTO"

@@ -38,6 +38,11 @@ class VLP_BPT_PT_sampling(_RenderPanel, bpy.types.Panel):
         column.prop(settings, "samples")
         column.prop(settings, "time_limit")
         column.prop(settings, "seed")
+        column.separator()
+        column.prop(settings, "denoise")
+        prefilter = column.column()
+        prefilter.active = settings.denoise
+        prefilter.prop(settings, "denoise_prefilter")
 
 
 class VLP_BPT_PT_light_paths(_RenderPanel, bpy.types.Panel):

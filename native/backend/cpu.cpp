@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "backend/backend.h"
+#include "backend/guided_pixel.h"
 #include "core/atomic_add.h"
 #include "core/parallel.h"
 #include "integrator/light_tracing.h"
@@ -129,7 +130,7 @@ private:
         pool_.run(static_cast<uint32_t>(vertices_in_piece_.size()), [&](uint32_t piece) {
             if (stop) return;
             LightVertex path_alone[k_max_walk];
-            SplatSink<AtomicAdd> sink{pass_, film.window(), film.splats().data(), {}};
+            SplatSink<AtomicAdd> sink{pass_, film.window(), film.splats().data(), film.point_splats().data(), {}};
             uint32_t vertices = 0, stored = 0;
             const uint32_t end = std::min((piece + 1) * k_paths_per_piece, pass_.light_paths);
             for (uint32_t path = piece * k_paths_per_piece; path < end; ++path) {
@@ -165,11 +166,18 @@ private:
         uint64_t dropped = 0;
         for (uint32_t y = tile.y * k_tile; y < y_end; ++y) {
             for (uint32_t x = tile.x * k_tile; x < x_end; ++x) {
+                const size_t i = static_cast<size_t>(y) * window.width + x;
+                const uint32_t px = window.x + x, py = window.y + y;
+                PixelSample& pixel = film.frame()[i];
+                if (film.has_guides()) {
+                    GuideSample& guide = film.guide_frame()[i];
+                    dropped += trace_guided_pixel(scene_, pass_, cache, iteration, px, py, pixel, guide);
+                    continue;
+                }
                 PixelSink sink{pass_};
-                const float alpha = trace_eye_path(scene_, pass_, cache, iteration, window.x + x, window.y + y, sink);
+                const float alpha = trace_eye_path(scene_, pass_, cache, iteration, px, py, sink);
                 dropped += sink.dropped;
-                const Rgb c = sink.radiance;
-                film.frame()[static_cast<size_t>(y) * window.width + x] = {{c.r, c.g, c.b, alpha}};
+                pixel = {{sink.radiance.r, sink.radiance.g, sink.radiance.b, alpha}};
             }
         }
         count_dropped(dropped);

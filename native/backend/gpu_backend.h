@@ -55,7 +55,7 @@ public:
         *counts_here_.data() = {};
         device_.clear(counts_.data(), counts_.bytes());
         place_scene(scene);
-        place_film(scene.window(), pass.splats);
+        place_film(scene.window(), pass);
         place_light_vertices(pass);
     }
 
@@ -67,10 +67,15 @@ public:
         const bool has_vlps = pass_.kappa > 0;
         const EyePass eye{scene_,         pass_,         iteration,     window_, has_vlps ? slots_.data() : nullptr,
                           stored_.data(), frame_.data(), counts_.data()};
-        if (!launch_in_batches(pixels(), eye, stop)) return false;
+        const bool went_on = pass_.guides ? launch_in_batches(pixels(), GuidedEyePass{eye, guides_.data()}, stop)
+                                          : launch_in_batches(pixels(), eye, stop);
+        if (!went_on) return false;
         device_.download(Queue::passes, counts_here_.data(), counts_.data(), counts_.bytes());
         if (downloading_ > 0) device_.queue_wait(Queue::passes, downloaded_);
-        device_.launch(0, 4 * pixels(), Commit{frame_.data(), splats_.data(), sums_.data(), kept_ == 0});
+        const auto channels = static_cast<uint32_t>(film_channels(pass_));
+        device_.launch(0, channels * pixels(),
+                       Commit{frame_.data(), guides_.data(), splats_.data(), point_splats_.data(), sums_.data(),
+                              channels, kept_ == 0});
         splats_are_clear_ = true;
         ++kept_;
         return true;
@@ -105,7 +110,7 @@ public:
     void add_memory(MemoryByDevice& memory) const override {
         MemoryUse& gpu = memory[Device::k_name];
         for (size_t part = 0; part < parts_.of.size(); ++part) gpu.scene.of[part] = parts_.of[part].buffer.bytes();
-        gpu.film += frame_.bytes() + splats_.bytes() + sums_.bytes();
+        gpu.film += frame_.bytes() + guides_.bytes() + splats_.bytes() + point_splats_.bytes() + sums_.bytes();
         gpu.light_vertices += slots_.bytes() + stored_.bytes();
         gpu.work += counts_.bytes() + end_of_path_.bytes() + vertices_in_path_.bytes() + scratch_.bytes();
         gpu.stacks = device_.stack_bytes();
@@ -167,11 +172,14 @@ private:
         });
     }
 
-    void place_film(Window window, bool splats) {
+    void place_film(Window window, const PassSettings& pass) {
         window_ = window;
-        resize(frame_, window.pixel_count(), "the film");
-        resize(sums_, window.pixel_count() * 4, "the film's sums");
-        resize(splats_, splats ? window.pixel_count() * 3 : 0, "splats");
+        const size_t pixels = window.pixel_count();
+        resize(frame_, pixels, "the film");
+        resize(guides_, pass.guides ? pixels : 0, "a denoiser's guides");
+        resize(sums_, pixels * film_channels(pass), "the film's sums");
+        resize(splats_, pass.splats ? pixels * 3 : 0, "splats");
+        resize(point_splats_, pass.splats && pass.guides ? pixels * 3 : 0, "splats");
         if (sums_here_.size() != sums_.size()) {
             sums_here_ = {};
             sums_here_ = Buffer<ExactSum>(device_, sums_.size(), "the film's sums on the host", true);
@@ -208,13 +216,20 @@ private:
     // For no path, so that the device reserves its stacks now and not in the middle of a render.
     void start_passes() {
         device_.launch(0, 0, LightPass{});
-        device_.launch(0, 0, EyePass{});
+        if (pass_.guides) {
+            device_.launch(0, 0, GuidedEyePass{});
+        } else {
+            device_.launch(0, 0, EyePass{});
+        }
         device_.record(finished_, Queue::passes);
         device_.wait(finished_);
     }
 
     bool run_light_pass(uint32_t iteration, const std::atomic<bool>& stop) {
-        if (!std::exchange(splats_are_clear_, false)) device_.clear(splats_.data(), splats_.bytes());
+        if (!std::exchange(splats_are_clear_, false)) {
+            device_.clear(splats_.data(), splats_.bytes());
+            device_.clear(point_splats_.data(), point_splats_.bytes());
+        }
         const LightPass light{scene_,
                               pass_,
                               iteration,
@@ -223,6 +238,7 @@ private:
                               end_of_path_.data(),
                               vertices_in_path_.data(),
                               splats_.data(),
+                              point_splats_.data(),
                               counts_.data()};
         if (!launch_in_batches(pass_.light_paths, light, stop)) return false;
         if (!(pass_.kappa > 0)) return true;
@@ -258,7 +274,8 @@ private:
     Buffer<uint8_t> vertices_in_path_;
     Buffer<std::byte> scratch_;
     Buffer<PixelSample> frame_;
-    Buffer<ExactSum> splats_, sums_, sums_here_;
+    Buffer<GuideSample> guides_;
+    Buffer<ExactSum> splats_, point_splats_, sums_, sums_here_;
     Buffer<PassCounts> counts_, counts_here_;  // "here": on the host
     typename Device::Event finished_{device_}, downloaded_{device_};
     std::array<typename Device::Event, 2> batches_{typename Device::Event{device_}, typename Device::Event{device_}};

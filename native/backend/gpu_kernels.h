@@ -3,8 +3,8 @@
 
 #include "core/atomic_add.h"
 #include "film/film.h"
+#include "integrator/guides.h"
 #include "integrator/light_tracing.h"
-#include "integrator/path_tracing.h"
 
 namespace vlp {
 
@@ -23,12 +23,12 @@ struct LightPass {
     LightVertex* slots;
     uint32_t* stored_in_path;
     uint8_t* vertices_in_path;
-    ExactSum* splats;
+    ExactSum *splats, *point_splats;
     PassCounts* counts;
 
     VLP_HD void operator()(uint32_t path) const {
         LightVertex* own = slots + static_cast<size_t>(path) * pass.light_path_length;
-        SplatSink<AtomicAdd> sink{pass, window, splats, {}};
+        SplatSink<AtomicAdd> sink{pass, window, splats, point_splats, {}};
         const LightPathCounts found = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
         vertices_in_path[path] = static_cast<uint8_t>(found.vertices);
         stored_in_path[path] = found.connectible;
@@ -68,33 +68,63 @@ struct EyePass {
     PixelSample* frame;
     PassCounts* counts;
 
-    VLP_HD void operator()(uint32_t pixel) const {
+    template <typename Sink>
+    VLP_HD void trace(uint32_t pixel, Sink& sink, const PixelSink& found) const {
         const uint32_t x = window.x + pixel % window.width, y = window.y + pixel / window.width;
         const LightVertexCache cache{slots, stored, slots ? static_cast<uint32_t>(counts->stored_vlps) : 0};
-        PixelSink sink{pass};
         const float alpha = trace_eye_path(scene, pass, cache, iteration, x, y, sink);
-        if (sink.dropped > 0) AtomicAdd{}(counts->dropped, sink.dropped);
-        frame[pixel] = {{sink.radiance.r, sink.radiance.g, sink.radiance.b, alpha}};
+        if (found.dropped > 0) AtomicAdd{}(counts->dropped, found.dropped);
+        frame[pixel] = {{found.radiance.r, found.radiance.g, found.radiance.b, alpha}};
+    }
+    VLP_HD void operator()(uint32_t pixel) const {
+        PixelSink sink{pass};
+        trace(pixel, sink, sink);
     }
 };
 
-// Adds an iteration to the sums, one number of a pixel at a time, and clears its splats. `anew`: the sums hold nothing yet.
+// The same with a denoiser's guides: a kernel of its own, so that the eye pass has no code for them.
+struct GuidedEyePass {
+    EyePass eye;
+    GuideSample* guides;
+
+    VLP_HD void operator()(uint32_t pixel) const {
+        GuidedSink sink(eye.pass, eye.scene);
+        eye.trace(pixel, sink, sink.pixel);
+        guides[pixel] = sink.guide();
+    }
+};
+
+// Adds an iteration to the sums, one channel of a pixel at a time, as Film::commit_rows does, and clears its splats. `anew`:
+// the sums hold nothing yet.
 struct Commit {
     const PixelSample* frame;
-    ExactSum* splats;  // may be null
+    const GuideSample* guides;        // may be null
+    ExactSum *splats, *point_splats;  // may be null
     ExactSum* sums;
+    uint32_t channels;
     bool anew;
 
     VLP_HD void operator()(uint32_t i) const {
-        const uint32_t pixel = i / 4, channel = i % 4;
+        const uint32_t pixel = i / channels, channel = i % channels;
         ExactSum sum = anew ? ExactSum{} : sums[i];
-        sum.add(frame[pixel].rgba[channel]);
-        if (splats && channel < 3) {
-            ExactSum& splat = splats[size_t{3} * pixel + channel];
-            sum.add(splat);
-            splat = {};
+        if (channel < 4) {
+            sum.add(frame[pixel].rgba[channel]);
+            if (channel < 3) move_to(sum, splats, pixel, channel);
+        } else if (channel < 7) {
+            sum.add(frame[pixel].rgba[channel - 4]);
+            move_to(sum, point_splats, pixel, channel - 4);
+        } else if (channel < 10) {
+            sum.add(guides[pixel].albedo[channel - 7]);
+        } else {
+            sum.add(max_of(guides[pixel].normal[channel - 10] + 1, 0.0f));
         }
         sums[i] = sum;
+    }
+    VLP_HD static void move_to(ExactSum& sum, ExactSum* of_pixels, uint32_t pixel, uint32_t channel) {
+        if (!of_pixels) return;
+        ExactSum& splat = of_pixels[size_t{3} * pixel + channel];
+        sum.add(splat);
+        splat = {};
     }
 };
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "bench/ray_scenes.h"
@@ -18,6 +19,7 @@ public:
 
     float closest(const Ray& ray) const;  // t; infinity: nothing
     bool occluded(const Ray& ray) const;
+    static std::string version();
     double build_seconds() const { return build_seconds_; }
 
 private:

@@ -66,61 +66,54 @@ std::function<double(const Ray*, const Ray*)> over(const Trace& trace) {
 
 double finite(float t) { return t < k_infinity ? static_cast<double>(t) : 0.0; }
 
-void measure(const BenchScene& scene, unsigned max_threads, int repeats) {
-    std::printf("%s, %zu primitives\n", scene.name.c_str(), scene.primitive_count());
+// The best of several builds, in seconds.
+template <typename Build>
+double build_seconds(int repeats, const Build& build) {
+    double best = 1e9;
+    for (int i = 0; i < repeats; ++i) best = min_of(best, build());
+    return best;
+}
+
+void measure(const BenchScene& scene, unsigned threads, int repeats) {
     Bvh bvh;
-    double build[2] = {1e9, 1e9};
-    for (unsigned threads = 1; threads <= max_threads; ++threads) {
-        ThreadPool pool(threads);
-        for (int i = 0; i < repeats; ++i) {
-            build[threads - 1] = min_of(build[threads - 1],
-                                        seconds_of([&] { bvh = build_bvh(scene.geometries, scene.instances, pool); }));
-        }
-    }
-    std::printf("  build       %8.4f s, %8.4f s on two threads; %.1f MB\n", build[0], build[1],
-                static_cast<double>(bvh.bytes()) * 1e-6);
+    ThreadPool pool(threads);
+    const double build = build_seconds(
+        repeats, [&] { return seconds_of([&] { bvh = build_bvh(scene.geometries, scene.instances, pool); }); });
+    scene.print_name();
+    std::printf("  build %.4f s, %.1f MB", build, static_cast<double>(bvh.bytes()) * 1e-6);
     const SceneView view = scene.view(bvh);
-    const RaySets sets = make_rays(scene, bvh);
     const auto closest = over([&](const Ray& ray) { return finite(closest_hit(view, ray, {}).t); });
     const auto occluded = over([&](const Ray& ray) { return any_hit(view, ray, {}, {}) ? 1.0 : 0.0; });
 #if VLP_WITH_EMBREE
-    double embree_build = 1e9;
-    for (int i = 0; i < repeats; ++i)
-        embree_build = min_of(embree_build, EmbreeScene(scene, max_threads).build_seconds());
-    std::printf("  Embree build                %8.4f s\n", embree_build);
-    const EmbreeScene embree(scene, max_threads);
+    std::printf("; Embree %.4f s", build_seconds(repeats, [&] { return EmbreeScene(scene, threads).build_seconds(); }));
+    const EmbreeScene embree(scene, threads);
     const auto embree_closest = over([&](const Ray& ray) { return finite(embree.closest(ray)); });
     const auto embree_occluded = over([&](const Ray& ray) { return embree.occluded(ray) ? 1.0 : 0.0; });
 #endif
-    struct Row {
-        const char* name;
-        const std::vector<Ray>* rays;
-        bool any;
-    };
-    for (const Row& row :
-         {Row{"camera", &sets.camera, false}, Row{"bounce", &sets.bounce, false}, Row{"shadow", &sets.shadow, true}}) {
-        for (unsigned threads = 1; threads <= max_threads; ++threads) {
-            ThreadPool pool(threads);
-            const Rate ours = rate_of(*row.rays, pool, repeats, row.any ? occluded : closest);
-            std::printf("  %s %u thread%s %8.2f Mrays/s", row.name, threads, threads > 1 ? "s" : " ", ours.mrays);
+    std::printf("\n");
+    for (const RaySet& set : make_rays(scene, bvh)) {
+        const Rate ours = rate_of(set.rays, pool, repeats, set.any ? occluded : closest);
+        std::printf("  %-10s %8.2f Mrays/s", set.name, ours.mrays);
 #if VLP_WITH_EMBREE
-            const Rate theirs = rate_of(*row.rays, pool, repeats, row.any ? embree_occluded : embree_closest);
-            std::printf("   Embree %8.2f   ratio %.2f   sums differ by %.1e", theirs.mrays, ours.mrays / theirs.mrays,
-                        std::fabs(ours.sum - theirs.sum) / theirs.sum);
+        const Rate theirs = rate_of(set.rays, pool, repeats, set.any ? embree_occluded : embree_closest);
+        std::printf("   Embree %8.2f   ratio %.2f   sums differ by %.1e", theirs.mrays, ours.mrays / theirs.mrays,
+                    std::fabs(ours.sum - theirs.sum) / theirs.sum);
 #endif
-            std::printf("\n");
-        }
+        std::printf("\n");
     }
 }
 
 }  // namespace
 
-// rays [repeats] [threads] [scene 0..2]
+// rays [repeats] [threads] [scene]
 int main(int argc, char** argv) {
     const int repeats = argc > 1 ? std::atoi(argv[1]) : 5;
-    const unsigned threads = argc > 2 && std::atoi(argv[2]) == 1 ? 1 : 2;
+    const auto threads = static_cast<unsigned>(argc > 2 ? std::atoi(argv[2]) : 1);
     const int only = argc > 3 ? std::atoi(argv[3]) : -1;
-    if (only < 0 || only == 0) measure(make_ball_in_room(), threads, repeats);
-    if (only < 0 || only == 1) measure(make_cluttered_room(), threads, repeats);
-    if (only < 0 || only == 2) measure(make_sierpinski(), threads, repeats);
+#if VLP_WITH_EMBREE
+    std::printf("%u thread(s), Embree %s, single-ray API\n", threads, EmbreeScene::version().c_str());
+#endif
+    for (int i = 0; i < k_scene_count; ++i) {
+        if (only < 0 || only == i) measure(make_scene(i), threads, repeats);
+    }
 }

@@ -20,7 +20,7 @@ namespace {
 
 using Picture = nb::ndarray<float, nb::shape<-1, -1, 4>, nb::c_contig, nb::device::cpu>;
 using RgbPicture = nb::ndarray<float, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
-using FilmState = nb::ndarray<const int64_t, nb::shape<-1, -1, 4, 2>, nb::c_contig, nb::device::cpu>;
+using FilmState = nb::ndarray<const int64_t, nb::shape<-1, -1, -1, 2>, nb::c_contig, nb::device::cpu>;
 
 template <typename T>
 T get(const nb::dict& settings, const char* name) {
@@ -57,6 +57,7 @@ PassSettings pass_of(const nb::dict& settings, bool transparent_film) {
     pass.clamp_direct = get<float>(settings, "clamp_direct");
     pass.clamp_indirect = get<float>(settings, "clamp_indirect");
     pass.transparent_film = transparent_film;
+    pass.guides = get<bool>(settings, "denoise");
     pass.seed = get<uint32_t>(settings, "seed");
     pass.filter = filter_of(get<std::string>(settings, "filter"));
     pass.filter_width = get<float>(settings, "filter_width");
@@ -81,7 +82,8 @@ nb::object film_state(Renderer& renderer) {
     auto* words = new int64_t[sums.size() * 2];
     std::memcpy(words, sums.data(), sums.size_bytes());
     nb::capsule owner(words, [](void* p) noexcept { delete[] static_cast<int64_t*>(p); });
-    return nb::cast(nb::ndarray<nb::numpy, int64_t>(words, {window.height, window.width, 4, 2}, owner));
+    return nb::cast(
+        nb::ndarray<nb::numpy, int64_t>(words, {window.height, window.width, renderer.film().channels(), 2}, owner));
 }
 
 // Arrays of a film begin with its rows and columns.
@@ -96,6 +98,10 @@ void require_size_of_film(const Renderer& renderer, const A& array, const char* 
 
 void add_film_state(Renderer& renderer, FilmState state, uint64_t iterations) {
     require_size_of_film(renderer, state, "film state");
+    if (state.shape(2) != renderer.film().channels()) {
+        throw std::invalid_argument("film state of " + std::to_string(state.shape(2)) + " channels, but the film has " +
+                                    std::to_string(renderer.film().channels()));
+    }
     renderer.add_film_state({reinterpret_cast<const ExactSum*>(state.data()), state.size() / 2}, iterations);
 }
 
@@ -191,6 +197,16 @@ void bind_renderer(nb::module_& m) {
                 r.film().read(rgba);
             },
             nb::arg("out").noconvert())
+        .def(
+            "read_guided",
+            [](Renderer& r, RgbPicture color, RgbPicture albedo, RgbPicture normal) {
+                for (const RgbPicture& picture : {color, albedo, normal}) require_size_of_film(r, picture, "picture");
+                nb::gil_scoped_release release;
+                r.settle();
+                r.film().read_guided({color.data(), color.size()}, {albedo.data(), albedo.size()},
+                                     {normal.data(), normal.size()});
+            },
+            nb::arg("color").noconvert(), nb::arg("albedo").noconvert(), nb::arg("normal").noconvert())
         .def("film_state", &film_state)
         .def("add_film_state", &add_film_state, nb::arg("state").noconvert(), nb::arg("iterations"))
         .def(

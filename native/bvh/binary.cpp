@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 
 #include "bvh/layout.h"
 
@@ -10,33 +11,76 @@ namespace vlp {
 
 namespace {
 
-constexpr uint32_t k_bins = 16;
+constexpr uint32_t k_max_bins = 32;
 constexpr uint32_t k_chunk = 16384;
 constexpr uint32_t k_min_job = 4096;        // refs in a subtree that is worth a thread
 constexpr uint32_t k_min_parallel = 65536;  // refs in a node that is worth all threads
+
+// Few refs need few bins, which take less time to clear and to sweep than refs to sort.
+uint32_t bins_for(uint32_t refs) { return refs < 32 ? 8 : refs < 1024 ? 16 : k_max_bins; }
+
+// Three floats and a zero in one register.
+using Float4 = float __attribute__((vector_size(16)));
+
+Float4 load(const Vec3& three_of_four) {
+    Float4 r;
+    std::memcpy(&r, &three_of_four, sizeof r);
+    r[3] = 0;  // an index, which as a number would be denormal, and slow
+    return r;
+}
+Float4 min4(Float4 a, Float4 b) { return a < b ? a : b; }
+Float4 max4(Float4 a, Float4 b) { return a > b ? a : b; }
+Vec3 to_vec3(Float4 v) { return {v[0], v[1], v[2]}; }
+
+struct Bounds {
+    Float4 low, high;
+
+    void include(Float4 from, Float4 to) { low = min4(low, from), high = max4(high, to); }
+    void include(const Bounds& b) { include(b.low, b.high); }
+    Box box() const { return {to_vec3(low), to_vec3(high)}; }
+    float half_area() const {
+        const Float4 e = high - low;
+        return e[0] >= 0 ? e[0] * (e[1] + e[2]) + e[1] * e[2] : 0;
+    }
+};
+
+constexpr Bounds k_nothing{{k_infinity, k_infinity, k_infinity, 0}, {-k_infinity, -k_infinity, -k_infinity, 0}};
+
+// A ref's corners, and its centre (from the middle, so that sums of large corners stay finite).
+struct RefBounds {
+    Float4 low, high, center;
+
+    explicit RefBounds(const Ref& ref) : low(load(ref.low)), high(load(ref.high)), center((low + high) * 0.5f) {}
+};
 
 // Refs [begin, end) and their bounds.
 struct Range {
     uint32_t begin = 0, end = 0;
     uint32_t depth = 0;
-    Box box, centers;
+    Bounds box = k_nothing, centers = k_nothing;
 
     uint32_t size() const { return end - begin; }
-    void include(const Ref& ref) { box.include(ref.box()), centers.include(ref.center()); }
+    void include(const RefBounds& ref) { box.include(ref.low, ref.high), centers.include(ref.center, ref.center); }
     void include(const Range& r) { box.include(r.box), centers.include(r.centers); }
 };
 
 struct Bin {
-    Box box;
-    uint32_t count = 0;
+    Bounds box;
+    uint32_t count;
 };
 
+// `count` bins along each axis; the others are never touched.
 struct Bins {
-    std::array<std::array<Bin, k_bins>, 3> axis;
+    std::array<std::array<Bin, k_max_bins>, 3> axis;
+    uint32_t count;
+
+    explicit Bins(uint32_t bins) : count(bins) {
+        for (auto& row : axis) std::fill_n(row.begin(), count, Bin{k_nothing, 0});
+    }
 
     void include(const Bins& other) {
         for (size_t a = 0; a < 3; ++a) {
-            for (size_t i = 0; i < k_bins; ++i) {
+            for (size_t i = 0; i < count; ++i) {
                 axis[a][i].box.include(other.axis[a][i].box);
                 axis[a][i].count += other.axis[a][i].count;
             }
@@ -46,23 +90,23 @@ struct Bins {
 
 // Which bin a centre falls into, along each axis.
 struct Binning {
-    Vec3 low, scale;
+    Float4 low, scale;
+    uint32_t bins;
 
-    explicit Binning(const Box& centers) : low(centers.low) {
-        const Vec3 e = centers.high - centers.low;
-        const auto bins_per_unit = [](float x) {
-            return x > 0 ? static_cast<float>(k_bins) * (1 - 0x1p-20f) / x : 0.0f;
-        };
-        scale = {bins_per_unit(e.x), bins_per_unit(e.y), bins_per_unit(e.z)};
+    Binning(const Bounds& centers, uint32_t bin_count) : low(centers.low), scale{0, 0, 0, 0}, bins(bin_count) {
+        for (int a = 0; a < 3; ++a) {
+            const float extent = centers.high[a] - centers.low[a];
+            scale[a] = extent > 0 ? static_cast<float>(bins) * (1 - 0x1p-20f) / extent : 0.0f;
+        }
     }
     // An extent whose inverse overflows makes infinite scales: min_of keeps every index in range.
-    static uint32_t index(float x) { return x < k_bins ? static_cast<uint32_t>(x) : k_bins - 1; }
-    std::array<uint32_t, 3> bins_of(Vec3 c) const {
-        const Vec3 b = (c - low) * scale;
-        return {index(b.x), index(b.y), index(b.z)};
+    uint32_t index(float x) const { return x < static_cast<float>(bins) ? static_cast<uint32_t>(x) : bins - 1; }
+    std::array<uint32_t, 3> bins_of(Float4 c) const {
+        const Float4 b = (c - low) * scale;
+        return {index(b[0]), index(b[1]), index(b[2])};
     }
-    uint32_t bin_of(Vec3 c, uint32_t axis) const { return bins_of(c)[axis]; }
-    bool splits(uint32_t axis) const { return (&scale.x)[axis] > 0 && (&scale.x)[axis] < k_infinity; }
+    uint32_t bin_of(Float4 c, uint32_t axis) const { return index((c[axis] - low[axis]) * scale[axis]); }
+    bool splits(uint32_t axis) const { return scale[axis] > 0 && scale[axis] < k_infinity; }
 };
 
 struct Split {
@@ -78,18 +122,18 @@ Split best_split(const Bins& bins, const Binning& binning) {
     for (uint32_t axis = 0; axis < 3; ++axis) {
         if (!binning.splits(axis)) continue;
         const auto& row = bins.axis[axis];
-        std::array<float, k_bins> right_cost;
-        std::array<uint32_t, k_bins> right_count;
-        Box box;
+        std::array<float, k_max_bins> right_cost;
+        std::array<uint32_t, k_max_bins> right_count;
+        Bounds box = k_nothing;
         uint32_t count = 0;
-        for (uint32_t i = k_bins - 1; i > 0; --i) {
+        for (uint32_t i = bins.count - 1; i > 0; --i) {
             box.include(row[i].box);
             count += row[i].count;
             right_cost[i] = box.half_area() * blocks(count);
             right_count[i] = count;
         }
-        box = {}, count = 0;
-        for (uint32_t i = 1; i < k_bins; ++i) {
+        box = k_nothing, count = 0;
+        for (uint32_t i = 1; i < bins.count; ++i) {
             box.include(row[i - 1].box);
             count += row[i - 1].count;
             if (count == 0 || right_count[i] == 0) continue;
@@ -102,11 +146,11 @@ Split best_split(const Bins& bins, const Binning& binning) {
 
 void add_to_bins(const Ref* refs, uint32_t begin, uint32_t end, const Binning& binning, Bins& bins) {
     for (uint32_t i = begin; i < end; ++i) {
-        const Ref& ref = refs[i];
-        const std::array<uint32_t, 3> b = binning.bins_of(ref.center());
+        const RefBounds ref(refs[i]);
+        const std::array<uint32_t, 3> b = binning.bins_of(ref.center);
         for (uint32_t axis = 0; axis < 3; ++axis) {
             Bin& bin = bins.axis[axis][b[axis]];
-            bin.box.include(ref.box());
+            bin.box.include(ref.low, ref.high);
             ++bin.count;
         }
     }
@@ -120,7 +164,7 @@ public:
     void build() {
         const auto count = static_cast<uint32_t>(refs_.size());
         const Range all = bounds(0, count, true);
-        tree_.box = all.box;
+        tree_.box = all.box.box();
         tree_.nodes.resize(count);
         std::vector<Job> large{{all, &tree_.root}}, small;
         const uint32_t limit = max_of(k_min_job, count / 128);
@@ -156,7 +200,7 @@ private:
     void descend(const Job& job, const Cut& cut, std::vector<Job>& stack) {
         BinaryNode& node = tree_.nodes[cut.split];
         *job.place = cut.split;
-        node.box[0] = cut.side[0].box, node.box[1] = cut.side[1].box;
+        node.box[0] = cut.side[0].box.box(), node.box[1] = cut.side[1].box.box();
         node.child[0] = node.child[1] = k_leaf_flag;
         node.begin = job.range.begin, node.end = job.range.end;
         stack.push_back({cut.side[1], &node.child[1]});
@@ -176,10 +220,10 @@ private:
     }
 
     Cut split(const Range& range, bool parallel) {
-        const Binning binning(range.centers);
+        const Binning binning(range.centers, bins_for(range.size()));
         Split best;
         if (range.depth < max_depth_) {
-            Bins bins;
+            Bins bins(binning.bins);
             if (parallel) {
                 bin_in_parallel(range, binning, bins);
             } else {
@@ -226,13 +270,13 @@ private:
         Range all;
         all.begin = begin, all.end = end;
         if (!parallel) {
-            for (uint32_t i = begin; i < end; ++i) all.include(refs_[i]);
+            for (uint32_t i = begin; i < end; ++i) all.include(RefBounds(refs_[i]));
             return all;
         }
         std::vector<Range> parts(chunks);
         pool_.run(chunks, [&](uint32_t chunk) {
             const uint32_t stop = min_of(end, begin + (chunk + 1) * k_chunk);
-            for (uint32_t i = begin + chunk * k_chunk; i < stop; ++i) parts[chunk].include(refs_[i]);
+            for (uint32_t i = begin + chunk * k_chunk; i < stop; ++i) parts[chunk].include(RefBounds(refs_[i]));
         });
         for (const Range& part : parts) all.include(part);
         return all;
@@ -240,7 +284,7 @@ private:
 
     // Puts the lower centres along the longest axis first; equal ones stay as they stand.
     void halve(const Range& range, uint32_t middle) {
-        const Vec3 e = range.centers.high - range.centers.low;
+        const Vec3 e = to_vec3(range.centers.high - range.centers.low);
         const uint32_t axis = e.x >= e.y && e.x >= e.z ? 0 : e.y >= e.z ? 1 : 2;
         if (!((&e.x)[axis] > 0)) return;
         const auto key = [axis](const Ref& r) { return (&r.low.x)[axis] + (&r.high.x)[axis]; };
@@ -250,10 +294,18 @@ private:
 
     void partition(const Range& range, const Binning& binning, const Split& best, Cut& cut) {
         uint32_t left = range.begin, right = range.end;
-        const auto goes_left = [&](const Ref& r) { return binning.bin_of(r.center(), best.axis) < best.bin; };
+        const auto goes_left = [&](const RefBounds& r) { return binning.bin_of(r.center, best.axis) < best.bin; };
         for (;;) {
-            while (left < right && goes_left(refs_[left])) cut.side[0].include(refs_[left++]);
-            while (left < right && !goes_left(refs_[right - 1])) cut.side[1].include(refs_[--right]);
+            for (; left < right; ++left) {
+                const RefBounds ref(refs_[left]);
+                if (!goes_left(ref)) break;
+                cut.side[0].include(ref);
+            }
+            for (; left < right; --right) {
+                const RefBounds ref(refs_[right - 1]);
+                if (goes_left(ref)) break;
+                cut.side[1].include(ref);
+            }
             if (left == right) break;
             std::swap(refs_[left], refs_[right - 1]);
         }
@@ -262,7 +314,7 @@ private:
 
     void bin_in_parallel(const Range& range, const Binning& binning, Bins& bins) {
         const uint32_t chunks = (range.size() + k_chunk - 1) / k_chunk;
-        std::vector<Bins> parts(chunks);
+        std::vector<Bins> parts(chunks, Bins(binning.bins));
         pool_.run(chunks, [&](uint32_t chunk) {
             const uint32_t begin = range.begin + chunk * k_chunk;
             add_to_bins(refs_.data(), begin, min_of(range.end, begin + k_chunk), binning, parts[chunk]);
@@ -277,11 +329,14 @@ private:
         std::vector<std::array<Range, 2>> parts(chunks);
         std::vector<std::array<uint32_t, 2>> counts(chunks);
         const auto chunk_end = [&](uint32_t chunk) { return min_of(range.end, range.begin + (chunk + 1) * k_chunk); };
-        const auto side_of = [&](const Ref& r) { return binning.bin_of(r.center(), best.axis) < best.bin ? 0u : 1u; };
+        const auto side_of = [&](const RefBounds& r) {
+            return binning.bin_of(r.center, best.axis) < best.bin ? 0u : 1u;
+        };
         pool_.run(chunks, [&](uint32_t chunk) {
             for (uint32_t i = range.begin + chunk * k_chunk; i < chunk_end(chunk); ++i) {
-                const uint32_t side = side_of(refs_[i]);
-                parts[chunk][side].include(refs_[i]);
+                const RefBounds ref(refs_[i]);
+                const uint32_t side = side_of(ref);
+                parts[chunk][side].include(ref);
                 ++counts[chunk][side];
             }
         });
@@ -302,7 +357,7 @@ private:
         pool_.run(chunks, [&](uint32_t chunk) {
             std::array<uint32_t, 2> place = counts[chunk];
             for (uint32_t i = range.begin + chunk * k_chunk; i < chunk_end(chunk); ++i) {
-                scratch_[place[side_of(refs_[i])]++] = refs_[i];
+                scratch_[place[side_of(RefBounds(refs_[i]))]++] = refs_[i];
             }
         });
         pool_.run(chunks, [&](uint32_t chunk) {

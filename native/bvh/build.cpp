@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bvh/collapse.h"
+#include "bvh/presplit.h"
 
 namespace vlp {
 
@@ -16,10 +16,11 @@ constexpr uint32_t k_tree_stack = k_stack_size / 2 - 1;  // the other half is fo
 
 WideTree build_tree(std::vector<Ref>& refs, const LeafSource& source, const uint8_t* kinds, ThreadPool& pool) {
     if (refs.size() >= 1u << k_child_index_bits) throw std::length_error("Too many primitives for one scene");
-    const LeafRule rule{k_block_width * 2, 0.6f, kinds};
-    WideTree tree = collapse(build_binary(refs, rule, 64, pool), refs, source, false, pool);
+    presplit(refs, source, pool);
+    const LeafRule rule{k_block_width, 0.6f, kinds};  // the plan makes larger leaves where they pay
+    WideTree tree = collapse(build_binary(refs, rule, 64, pool), refs, source, &rule, pool);
     if (tree.stack_need > k_tree_stack) {  // shapes whose sizes grow exponentially
-        tree = collapse(build_binary(refs, rule, 0, pool), refs, source, true, pool);
+        tree = collapse(build_binary(refs, rule, 0, pool), refs, source, nullptr, pool);
     }
     return tree;
 }

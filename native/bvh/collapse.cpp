@@ -1,7 +1,7 @@
-// Opens the largest child until a node is full; subtrees are done in parallel and put one behind the other.
+// Writes wide nodes from the root down; subtrees are done in parallel and put one behind the other.
 #include "bvh/collapse.h"
 
-#include <array>
+#include <memory>
 
 #include "bvh/pack.h"
 
@@ -11,73 +11,71 @@ namespace {
 
 constexpr uint32_t k_min_job = 2048;  // refs in a subtree that is worth a thread
 
-// A subtree of the binary tree: a node, or a leaf of refs [begin, end).
-struct Entry {
-    Box box;
-    uint32_t node, begin, end;
-};
+// Opens the child with the most refs until a node is full, which bounds the depth.
+WideChildren balanced_children(const BinaryTree& tree, const Subtree& subtree) {
+    WideChildren children;
+    children.add(subtree);
+    while (children.count < k_node_width) {
+        uint32_t best = k_none, most = 0;
+        for (uint32_t i = 0; i < children.count; ++i) {
+            const Subtree& child = children.child[i];
+            if (!child.is_leaf() && child.size() > most) most = child.size(), best = i;
+        }
+        if (best == k_none) break;
+        const Subtree opened = children.child[best];
+        children.child[best] = left_of(tree, opened);
+        children.add(right_of(tree, opened));
+    }
+    return children;
+}
 
 // A subtree left to a thread, and the child that will point to it.
 struct Job {
-    Entry entry;
+    Subtree subtree;
     uint32_t parent, slot;
 };
 
 class Collapser {
 public:
-    Collapser(const BinaryTree& tree, std::span<const Ref> refs, const LeafSource& source, bool balanced,
+    // `plan`: null for a balanced tree.
+    Collapser(const BinaryTree& tree, std::span<const Ref> refs, const LeafSource& source, const Plan* plan,
               uint32_t job_size, WideTree& out)
-        : tree_(tree), refs_(refs), source_(source), balanced_(balanced), job_size_(job_size), out_(out) {}
+        : tree_(tree), refs_(refs), source_(source), plan_(plan), job_size_(job_size), out_(out) {}
 
     // Writes the subtree and returns its root and the stack that it needs.
     struct Written {
         uint32_t node, stack_need;
     };
-    Written write(const Entry& entry) {
-        std::array<Entry, k_node_width> children;
-        const uint32_t count = open(entry, children);
+    Written write(const Subtree& subtree) {
+        const WideChildren children = plan_ ? plan_->children_of(subtree) : balanced_children(tree_, subtree);
         const auto index = static_cast<uint32_t>(out_.nodes.size());
         out_.nodes.emplace_back();
         uint32_t deepest = 1;
         for (uint32_t i = 0; i < k_node_width; ++i) {
-            set_bounds(out_.nodes[index], i, i < count ? children[i].box : Box{});
+            const bool there = i < children.count;
+            const Subtree& to = children.child[i];
+            set_bounds(out_.nodes[index], i, there ? widened(to.box) : Box{});
             uint32_t child = k_none;
-            if (i < count && children[i].node == k_leaf_flag) {
-                child = pack_leaf(refs_.subspan(children[i].begin, children[i].end - children[i].begin), source_, out_);
-            } else if (i < count && children[i].end - children[i].begin < job_size_) {
-                jobs.push_back({children[i], index, i});
-            } else if (i < count) {
-                const Written written = write(children[i]);
+            if (there && to.is_leaf()) {
+                child = pack_leaf(refs_.subspan(to.begin, to.size()), source_, out_);
+            } else if (there && to.size() < job_size_) {
+                jobs.push_back({to, index, i});
+            } else if (there) {
+                const Written written = write(to);
                 child = make_child(ChildKind::node, written.node);
                 deepest = max_of(deepest, written.stack_need);
             }
             out_.nodes[index].child[i] = child;
         }
-        return {index, deepest + count - 1};
+        return {index, deepest + children.count - 1};
     }
 
     std::vector<Job> jobs;
 
 private:
-    uint32_t open(const Entry& entry, std::array<Entry, k_node_width>& children) const {
-        uint32_t count = 1;
-        children[0] = entry;
-        while (count < k_node_width) {
-            uint32_t best = k_none;
-            float largest = -1;
-            for (uint32_t i = 0; i < count; ++i) {
-                if (children[i].node == k_leaf_flag) continue;
-                const float size = balanced_ ? static_cast<float>(children[i].end - children[i].begin)
-                                             : min_of(children[i].box.half_area(), 0x1p127f);
-                if (size > largest) largest = size, best = i;
-            }
-            if (best == k_none) break;
-            const uint32_t split = children[best].node;
-            const BinaryNode& node = tree_.nodes[split];
-            children[best] = {node.box[0], node.child[0], node.begin, split};
-            children[count++] = {node.box[1], node.child[1], split, node.end};
-        }
-        return count;
+    static Box widened(const Box& box) {
+        const auto margin = [](Vec3 v) { return Vec3{std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)} * k_box_margin; };
+        return {box.low - margin(box.low), box.high + margin(box.high)};
     }
 
     static void set_bounds(BvhNode& node, uint32_t i, const Box& box) {
@@ -90,7 +88,7 @@ private:
     const BinaryTree& tree_;
     std::span<const Ref> refs_;
     const LeafSource& source_;
-    bool balanced_;
+    const Plan* plan_;
     uint32_t job_size_;  // smaller subtrees become jobs; 0: none does
     WideTree& out_;
 };
@@ -111,19 +109,20 @@ uint32_t append(WideTree& whole, const WideTree& part) {
     return node_base;
 }
 
-WideTree collapse(const BinaryTree& tree, std::span<const Ref> refs, const LeafSource& source, bool balanced,
+WideTree collapse(const BinaryTree& tree, std::span<const Ref> refs, const LeafSource& source, const LeafRule* rule,
                   ThreadPool& pool) {
     WideTree whole;
     whole.box = tree.box;
     if (refs.empty()) return whole;
     const auto count = static_cast<uint32_t>(refs.size());
     const uint32_t job_size = count < 2 * k_min_job ? 0 : max_of(k_min_job, count / 256);
-    Collapser top(tree, refs, source, balanced, job_size, whole);
+    const auto plan = rule ? std::make_unique<Plan>(tree, refs, *rule, pool) : nullptr;
+    Collapser top(tree, refs, source, plan.get(), job_size, whole);
     const uint32_t top_need = top.write({tree.box, tree.root, 0, count}).stack_need;
     std::vector<WideTree> parts(top.jobs.size());
     pool.run(static_cast<uint32_t>(parts.size()), [&](uint32_t i) {
-        Collapser part(tree, refs, source, balanced, 0, parts[i]);
-        parts[i].stack_need = part.write(top.jobs[i].entry).stack_need;
+        Collapser part(tree, refs, source, plan.get(), 0, parts[i]);
+        parts[i].stack_need = part.write(top.jobs[i].subtree).stack_need;
     });
     uint32_t deepest = 0;
     for (size_t i = 0; i < parts.size(); ++i) {

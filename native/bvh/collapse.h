@@ -1,8 +1,7 @@
 // From a binary tree to wide nodes (Wald, Benthin & Boulos 2008) with their leaves packed into blocks.
 #pragma once
 
-#include "bvh/binary.h"
-#include "bvh/layout.h"
+#include "bvh/plan.h"
 
 namespace vlp {
 
@@ -21,8 +20,8 @@ struct LeafSource {
     const GeometryView* geometry = nullptr;
 };
 
-// `balanced`: opens the child with the most refs instead of the largest one, which bounds the depth.
-WideTree collapse(const BinaryTree& tree, std::span<const Ref> refs, const LeafSource& source, bool balanced,
+// `rule`: by the cheapest plan; null: opens the child with the most refs first, which bounds the depth.
+WideTree collapse(const BinaryTree& tree, std::span<const Ref> refs, const LeafSource& source, const LeafRule* rule,
                   ThreadPool& pool);
 
 // Appends `part` to `whole` and returns the index of its root there.

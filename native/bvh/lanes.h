@@ -29,21 +29,30 @@ VLP_FORCE_INLINE __m128 rounded_product(__m128 a, __m128 b) {
     return product;
 }
 
+// The larger and the smaller of times of which the result is at least 0 or does not matter: as integers they compare
+// faster, and negative ones still come before the others.
+VLP_FORCE_INLINE __m256 later(__m256 a, __m256 b) {
+    return _mm256_castsi256_ps(_mm256_max_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)));
+}
+VLP_FORCE_INLINE __m256 earlier(__m256 a, __m256 b) {
+    return _mm256_castsi256_ps(_mm256_min_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)));
+}
+
 }  // namespace detail
 
 // Bit i: the ray meets child i before t_max, and enters it at entry[i].
 VLP_FORCE_INLINE uint32_t meet_children(const TraversalRay& ray, const BvhNode& node, float t_max, float* entry) {
-    const __m256 near_x = detail::meet(node, ray.near_row[0], ray.slope[0], ray.entry[0]);
-    const __m256 near_y = detail::meet(node, ray.near_row[1], ray.slope[1], ray.entry[1]);
-    const __m256 near_z = detail::meet(node, ray.near_row[2], ray.slope[2], ray.entry[2]);
-    const __m256 far_x = detail::meet(node, ray.far_row[0], ray.slope[0], ray.exit[0]);
-    const __m256 far_y = detail::meet(node, ray.far_row[1], ray.slope[1], ray.exit[1]);
-    const __m256 far_z = detail::meet(node, ray.far_row[2], ray.slope[2], ray.exit[2]);
-    const __m256 near_t = _mm256_max_ps(_mm256_max_ps(near_x, near_y), _mm256_max_ps(near_z, _mm256_setzero_ps()));
-    const __m256 far_t = _mm256_min_ps(_mm256_min_ps(far_x, far_y), far_z);
-    const __m256 last = _mm256_min_ps(_mm256_mul_ps(far_t, _mm256_set1_ps(k_exit_factor)), _mm256_set1_ps(t_max));
+    using detail::earlier, detail::later, detail::meet;
+    const __m256 near_x = meet(node, ray.near_row[0], ray.slope[0], ray.entry[0]);
+    const __m256 near_y = meet(node, ray.near_row[1], ray.slope[1], ray.entry[1]);
+    const __m256 near_z = meet(node, ray.near_row[2], ray.slope[2], ray.entry[2]);
+    const __m256 far_x = meet(node, ray.far_row[0], ray.slope[0], ray.exit[0]);
+    const __m256 far_y = meet(node, ray.far_row[1], ray.slope[1], ray.exit[1]);
+    const __m256 far_z = meet(node, ray.far_row[2], ray.slope[2], ray.exit[2]);
+    const __m256 near_t = later(later(near_x, near_y), later(near_z, _mm256_setzero_ps()));
+    const __m256 far_t = earlier(earlier(far_x, far_y), earlier(far_z, _mm256_set1_ps(t_max)));
     _mm256_store_ps(entry, near_t);
-    return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(near_t, last, _CMP_LE_OQ)));
+    return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(near_t, far_t, _CMP_LE_OQ)));
 }
 
 struct alignas(16) BlockHits {
@@ -106,14 +115,13 @@ VLP_FORCE_INLINE uint32_t intersect_block(const TraversalRay& ray, const Triangl
 VLP_HD inline uint32_t meet_children(const TraversalRay& ray, const BvhNode& node, float t_max, float* entry) {
     uint32_t mask = 0;
     for (uint32_t i = 0; i < k_node_width; ++i) {
-        float near_t = 0, far_t = k_infinity;
+        float near_t = 0, far_t = t_max;
         for (uint32_t axis = 0; axis < 3; ++axis) {
-            const float slope = ray.slope[axis];
-            near_t = max_of(near_t, node.bounds[ray.near_row[axis]][i] * slope + ray.entry[axis]);
-            far_t = min_of(far_t, node.bounds[ray.far_row[axis]][i] * slope + ray.exit[axis]);
+            near_t = max_of(near_t, node.bounds[ray.near_row[axis]][i] * ray.slope[axis] + ray.entry[axis]);
+            far_t = min_of(far_t, node.bounds[ray.far_row[axis]][i] * ray.slope[axis] + ray.exit[axis]);
         }
         entry[i] = near_t;
-        mask |= (near_t <= min_of(far_t * k_exit_factor, t_max) ? 1u : 0u) << i;
+        mask |= (near_t <= far_t ? 1u : 0u) << i;
     }
     return mask;
 }

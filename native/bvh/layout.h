@@ -21,6 +21,9 @@ VLP_HD constexpr ChildKind child_kind(uint32_t child) { return static_cast<Child
 VLP_HD constexpr uint32_t child_index(uint32_t child) { return child & ((1u << k_child_index_bits) - 1); }
 VLP_HD constexpr uint32_t child_blocks(uint32_t child) { return ((child >> k_child_index_bits) & 7u) + 1; }
 
+// By how much of its size a coordinate of a box is moved outwards; see TraversalRay.
+inline constexpr float k_box_margin = 0x1p-21f;
+
 // Rows of `bounds`: low x, y, z, high x, y, z. An absent child has low = +inf and high = -inf, which no ray meets.
 struct alignas(64) BvhNode {
     float bounds[6][k_node_width];

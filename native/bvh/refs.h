@@ -28,7 +28,6 @@ struct Ref {
     uint32_t primitive;  // k_none: the whole instance
 
     Box box() const { return {low, high}; }
-    Vec3 center() const { return (low + high) * 0.5f; }
 };
 
 struct Corners {

@@ -7,8 +7,9 @@
 
 namespace vlp {
 
-// A plane x = b of a box is met at t = b * slope + offset. The entry's offset is rounded down and the exit's up, by more
-// than their rounding errors, so that a box is never missed whose triangles the watertight test would hit (Ize 2013).
+// A plane x = b of a box is entered at t = b * slope + entry and left at b * slope + exit. The entry is rounded down and
+// the exit up, by more than the rounding errors of slope and offset, and boxes are wider by more than what b adds to them
+// (k_box_margin): no box is missed whose triangles the watertight test would hit (Ize 2013).
 struct TraversalRay {
     Vec3 origin, direction;
     float slope[3], entry[3], exit[3];
@@ -16,10 +17,9 @@ struct TraversalRay {
     ShearedRay sheared;
 };
 
-// The relative error of entry and exit times, as a factor on the exit.
-inline constexpr float k_exit_factor = 1.0f + 0x1p-20f;
-
 VLP_HD inline TraversalRay make_traversal_ray(Vec3 origin, Vec3 direction) {
+    constexpr float k_offset_error = 0x1p-21f;
+    constexpr float k_max_offset = 0x1p126f;  // keeps times numbers
     TraversalRay r;
     r.origin = origin, r.direction = direction;
     const float o[3] = {origin.x, origin.y, origin.z}, d[3] = {direction.x, direction.y, direction.z};
@@ -27,7 +27,8 @@ VLP_HD inline TraversalRay make_traversal_ray(Vec3 origin, Vec3 direction) {
     const float least = 1e-18f * max_of(std::fabs(d[0]), max_of(std::fabs(d[1]), std::fabs(d[2])));
     for (uint32_t axis = 0; axis < 3; ++axis) {
         const float safe = std::fabs(d[axis]) < least ? std::copysign(least, d[axis]) : d[axis];
-        const float slope = 1.0f / safe, offset = -o[axis] * slope, error = std::fabs(offset) * 0x1p-22f;
+        const float slope = 1.0f / safe, offset = max_of(min_of(-o[axis] * slope, k_max_offset), -k_max_offset);
+        const float error = std::fabs(offset) * k_offset_error;
         r.slope[axis] = slope, r.entry[axis] = offset - error, r.exit[axis] = offset + error;
         r.near_row[axis] = slope >= 0 ? axis : axis + 3;
         r.far_row[axis] = slope >= 0 ? axis + 3 : axis;

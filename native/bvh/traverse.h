@@ -6,6 +6,16 @@
 
 namespace vlp {
 
+// Steps through nodes and blocks, counted only in the ray benchmark's second build: counting takes time.
+#if VLP_COUNT_VISITS
+inline thread_local uint64_t visited_nodes, visited_blocks;
+VLP_HD inline void count_node() { ++visited_nodes; }
+VLP_HD inline void count_block() { ++visited_blocks; }
+#else
+VLP_HD inline void count_node() {}
+VLP_HD inline void count_block() {}
+#endif
+
 namespace detail {
 
 VLP_HD inline bool is(PrimitiveId id, uint32_t instance, uint32_t primitive) {
@@ -28,10 +38,12 @@ VLP_HD inline float intersect_lane(const TraversalRay& ray, const SphereBlock& b
 // Asks for the memory of a child that will soon be visited, while others are still in work.
 VLP_HD VLP_FORCE_INLINE void prefetch([[maybe_unused]] const BvhView& bvh, [[maybe_unused]] uint32_t child) {
 #if !VLP_ON_DEVICE
-    const uint32_t index = child_index(child);
-    const char* const first = child_kind(child) == ChildKind::node
-                                  ? reinterpret_cast<const char*>(bvh.nodes + index)
-                                  : reinterpret_cast<const char*>(bvh.triangle_blocks + index);
+    // Without a branch, which would be mispredicted; spheres and instances are few and not worth it.
+    const uint64_t at_leaf = child_kind(child) == ChildKind::node ? 0 : ~uint64_t{0};
+    const auto nodes = reinterpret_cast<uint64_t>(bvh.nodes), blocks = reinterpret_cast<uint64_t>(bvh.triangle_blocks);
+    const uint64_t base = nodes ^ ((nodes ^ blocks) & at_leaf);
+    const uint64_t size = sizeof(BvhNode) ^ ((sizeof(BvhNode) ^ sizeof(TriangleBlock)) & at_leaf);
+    const auto* const first = reinterpret_cast<const char*>(base + child_index(child) * size);
     __builtin_prefetch(first);
     __builtin_prefetch(first + 64);
     __builtin_prefetch(first + 128);
@@ -82,6 +94,7 @@ VLP_HD inline void closest_in_tree(const SceneView& scene, const Ray& world_ray,
     for (;;) {
         bool at_leaf = true;
         while (child_kind(child) == ChildKind::node) {
+            count_node();
             const BvhNode& node = bvh.nodes[child];
             alignas(32) float entry[k_node_width];
             const uint32_t mask = meet_children(ray, node, hit.t, entry);
@@ -96,6 +109,7 @@ VLP_HD inline void closest_in_tree(const SceneView& scene, const Ray& world_ray,
             const uint32_t index = child_index(child), end = index + child_blocks(child);
             if (child_kind(child) == ChildKind::triangles) {
                 for (uint32_t b = index; b < end; ++b) {
+                    count_block();
                     const TriangleBlock& block = bvh.triangle_blocks[b];
                     BlockHits hits;
                     for (uint32_t mask = intersect_block(ray, block, hit.t, hits); mask != 0; mask &= mask - 1) {
@@ -107,6 +121,7 @@ VLP_HD inline void closest_in_tree(const SceneView& scene, const Ray& world_ray,
                 }
             } else if (child_kind(child) == ChildKind::spheres) {
                 for (uint32_t b = index; b < end; ++b) {
+                    count_block();
                     const SphereBlock& block = bvh.sphere_blocks[b];
                     for (uint32_t i = 0; i < k_block_width; ++i) {
                         const uint32_t owner = in_world ? block.instance[i] : instance;
@@ -139,6 +154,7 @@ VLP_HD inline bool any_in_tree(const SceneView& scene, const Ray& world_ray, con
     for (;;) {
         bool at_leaf = true;
         while (child_kind(child) == ChildKind::node) {
+            count_node();
             const BvhNode& node = bvh.nodes[child];
             alignas(32) float entry[k_node_width];
             uint32_t mask = meet_children(ray, node, world_ray.t_max, entry);
@@ -157,6 +173,7 @@ VLP_HD inline bool any_in_tree(const SceneView& scene, const Ray& world_ray, con
             const uint32_t index = child_index(child), end = index + child_blocks(child);
             if (child_kind(child) == ChildKind::triangles) {
                 for (uint32_t b = index; b < end; ++b) {
+                    count_block();
                     const TriangleBlock& block = bvh.triangle_blocks[b];
                     BlockHits hits;
                     for (uint32_t mask = intersect_block(ray, block, world_ray.t_max, hits); mask != 0;
@@ -169,6 +186,7 @@ VLP_HD inline bool any_in_tree(const SceneView& scene, const Ray& world_ray, con
                 }
             } else if (child_kind(child) == ChildKind::spheres) {
                 for (uint32_t b = index; b < end; ++b) {
+                    count_block();
                     const SphereBlock& block = bvh.sphere_blocks[b];
                     for (uint32_t i = 0; i < k_block_width; ++i) {
                         const uint32_t owner = in_world ? block.instance[i] : instance;

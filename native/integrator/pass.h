@@ -28,6 +28,7 @@ struct PassSettings {
     float clamp_direct = 0,
           clamp_indirect = 0;  // most that one find adds to a pixel (mean of its channels), 0: no limit
     bool transparent_film = false;   // the camera sees no background
+    bool guides = false;             // gathers those of a denoiser, see guides.h
     uint32_t seed = 0;
     float kappa = 0;  // C M N / V, V being what a pilot pass of the scene stored: how often a VLP is drawn
     Filter filter = Filter::blackman_harris;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "camera/projection.h"
+#include "core/bits.h"
 #include "film/exact_sum.h"
 #include "film/window.h"
 #include "integrator/trace.h"
@@ -74,12 +75,15 @@ VLP_HD inline void for_each_pixel(const PassSettings& pass, Window window, Vec2 
     }
 }
 
-// Adds splats to the exact sums of a window's pixels, 3 each, leaving out those that are not finite.
+// Adds splats to the exact sums of a window's pixels, 3 each, leaving out those that are not finite. `points`, where there
+// are, get each splat a second time, whole in one pixel that is drawn by the filter: noise that neighbours share looks like
+// texture to a denoiser.
 template <typename FetchAdd>
 struct SplatSink {
     const PassSettings& pass;
     Window window;
     ExactSum* sums;
+    ExactSum* points;
     FetchAdd fetch_add;  // see add_shared
     uint32_t dropped = 0;
 
@@ -101,14 +105,30 @@ struct SplatSink {
         // An iteration has at most N L splats, which together must not overflow.
         const float most =
             0x1p62f / (static_cast<float>(pass.light_paths) * static_cast<float>(pass.light_path_length));
+        float total = 0;
         for_each_pixel(pass, window, splat.film, [&](uint32_t x, uint32_t y, float h) {
-            ExactSum* pixel = sums + 3 * (static_cast<size_t>(y - window.y) * window.width + (x - window.x));
-            const Rgb share = clamped(pass, splat.found.s + 1, weighted * h);
-            const float rgb[3] = {share.r, share.g, share.b};
-            for (int c = 0; c < 3; ++c) {
-                if (rgb[c] > 0) add_shared(pixel[c], exact(rgb[c], most), fetch_add);
-            }
+            add_to(sums, x, y, clamped(pass, splat.found.s + 1, weighted * h), most);
+            total += h;
         });
+        if (points == nullptr || !(total > 0)) return;
+        const uint32_t random = hash(bits_of(splat.film.x), bits_of(splat.film.y), bits_of(weighted.r));
+        float left = total * unit_float(random);
+        bool drawn = false;
+        for_each_pixel(pass, window, splat.film, [&](uint32_t x, uint32_t y, float h) {
+            left -= h;
+            if (drawn || left >= 0) return;
+            drawn = true;
+            add_to(points, x, y, clamped(pass, splat.found.s + 1, weighted * h) * (total / h), most);
+        });
+    }
+
+private:
+    VLP_HD void add_to(ExactSum* images, uint32_t x, uint32_t y, Rgb light, float most) {
+        ExactSum* pixel = images + 3 * (static_cast<size_t>(y - window.y) * window.width + (x - window.x));
+        const float rgb[3] = {light.r, light.g, light.b};
+        for (int c = 0; c < 3; ++c) {
+            if (rgb[c] > 0) add_shared(pixel[c], exact(rgb[c], most), fetch_add);
+        }
     }
 };
 

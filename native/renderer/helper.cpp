@@ -14,7 +14,9 @@ double now() { return std::chrono::duration<double>(std::chrono::steady_clock::n
 }  // namespace
 
 Helper::Helper(std::unique_ptr<Backend> backend, const Film& like)
-    : backend_(std::move(backend)), film_(like.window(), like.has_splats()), thread_([this] { work(); }) {}
+    : backend_(std::move(backend)),
+      film_(like.window(), like.has_splats(), like.has_guides()),
+      thread_([this] { work(); }) {}
 
 Helper::~Helper() { end_thread(); }
 

@@ -77,7 +77,7 @@ Renderer::Renderer(std::shared_ptr<const Scene> scene, const PassSettings& pass,
                    uint32_t first, uint32_t end)
     : scene_(std::move(scene)),
       pass_(pass),
-      film_(window, pass.splats),
+      film_(window, pass.splats, pass.guides),
       main_(std::move(devices.main)),
       active_(main_.get()),
       helper_(devices.helper ? std::make_unique<Helper>(std::move(devices.helper), film_) : nullptr),
@@ -218,7 +218,7 @@ void Renderer::update(std::shared_ptr<const Scene> scene, const PassSettings& pa
         const std::lock_guard lock(mutex_);
         scene_ = std::move(scene);
         pass_ = pass;
-        film_ = Film(scene_->window(), pass.splats);
+        film_ = Film(scene_->window(), pass.splats, pass.guides);
     }
     iterations_.restart(first);
     end_ = end;

@@ -48,9 +48,10 @@ def render_blend(
     render.filepath = str(output.resolve())
     render.use_file_extension = False
     image = render.image_settings
+    layers = bpy.context.scene.vlp_bpt.denoise and output.suffix.lower() == ".exr"  # passes are kept in those alone
     if hasattr(image, "media_type"):  # from Blender 5.0 on
-        image.media_type = "IMAGE"
-    image.file_format = {".exr": "OPEN_EXR", ".png": "PNG"}[output.suffix.lower()]
+        image.media_type = "MULTI_LAYER_IMAGE" if layers else "IMAGE"
+    image.file_format = "OPEN_EXR_MULTILAYER" if layers else {".exr": "OPEN_EXR", ".png": "PNG"}[output.suffix.lower()]
     image.color_mode = "RGBA" if render.film_transparent else "RGB"
     bits = {Depth.FLOAT: "32", Depth.HALF: "16", Depth.INT8: "8", Depth.INT16: "16"}
     image.color_depth = bits[check_output(output, depth)]

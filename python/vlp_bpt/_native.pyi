@@ -107,7 +107,8 @@ class Renderer:
     def set_deadline(self, seconds: float) -> None: ...
     def progress(self) -> float: ...
     def read(self, out: _Float32) -> None: ...  # (height, width, 4)
-    def film_state(self) -> NDArray[np.int64]: ...  # (height, width, 4, 2): low and high words
+    def read_guided(self, color: _Float32, albedo: _Float32, normal: _Float32) -> None: ...  # (height, width, 3)
+    def film_state(self) -> NDArray[np.int64]: ...  # (height, width, 4 or with guides 13, 2): low and high words
     def add_film_state(self, state: NDArray[np.int64], iterations: int) -> None: ...
     def lost_light(self, threads: int) -> list[float]: ...  # share and its standard error
     def memory(self) -> dict[str, dict[str, int]]: ...  # bytes by device and part

@@ -80,6 +80,8 @@ def summary_text(statistics: Statistics) -> str:
         f"{statistics.vlps} virtual light points",
         f"{statistics.memory_bytes / 2**20:.0f} MiB",
     ]
+    if statistics.denoise_seconds:
+        parts.append(f"denoised in {statistics.denoise_seconds:.2f} s")
     if statistics.dropped:
         parts.append(f"{statistics.dropped} samples that were not finite left out")
     return ", ".join(parts)

@@ -1,4 +1,4 @@
-"""The command line: `vlp-bpt render | export | info | compare | merge | bench`."""
+"""The command line: `vlp-bpt render | export | info | compare | merge | denoise | bench`."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from typing import Any, NoReturn
 
 from . import __version__, metrics
 from ._progress import ProgressDisplay, lost_light_text, summary_text
+from .denoise import denoise
 from .errors import Cancelled, DeviceError, Error, SceneError
-from .images import Depth, check_output, read_image, write_image
+from .images import ALBEDO, NOISY, NORMAL, Depth, check_output, read_image, write_image
 from .memory import memory_lines, total_text
 from .merge import merge_images
 from .render import Progress, Renderer, devices, load_native, native_errors
@@ -127,6 +128,19 @@ def _parser() -> _Parser:
     )
     merge.add_argument("parts", type=Path, nargs="+", metavar="PART.exr")
     _add_output(merge)
+
+    denoising = command(
+        "denoise",
+        _denoise,
+        "denoise a picture, guided by the layers Denoising Albedo and Denoising Normal where it has them",
+        "vlp-bpt denoise noisy.exr -o clean.png\nvlp-bpt denoise cycles.exr -o clean.exr --no-prefilter",
+    )
+    denoising.add_argument("file", type=Path, metavar="IN", help="its layer Noisy Image is taken where it has one")
+    _add_output(denoising)
+    denoising.add_argument(
+        "--no-prefilter", action="store_true", help="take the guides as they are: faster, more error"
+    )
+    denoising.add_argument("--threads", type=int, default=0, help="0 for all (default)")
 
     commands.add_parser("bench", help="measure speed and error over time (vlp-bpt bench --help)", add_help=False)
     return parser
@@ -315,6 +329,8 @@ def _info(options: argparse.Namespace) -> int:
     print(f"{options.file}: {width} x {height} pixels, mean ({mean})")
     for name, value in image.metadata.items():
         print(f"  {name}: {json.dumps(value)}")
+    if image.layers:
+        print(f"  layers: {', '.join(image.layers)}")
     if image.film_state is not None:
         print("  holds exact sums: can be merged")
     return 0
@@ -372,6 +388,18 @@ def _merge(options: argparse.Namespace) -> int:
     write_image(options.output, image, options.depth)
     ranges = ", ".join(f"{begin}:{end}" for begin, end in image.metadata["ranges"])
     print(f"{options.output}: {image.metadata['iterations']} iterations ({ranges})")
+    return 0
+
+
+def _denoise(options: argparse.Namespace) -> int:
+    check_output(options.output, options.depth)
+    image = read_image(options.file)
+    noisy = image.layers.setdefault(NOISY, image.pixels)
+    guides = image.layers.get(ALBEDO), image.layers.get(NORMAL) if ALBEDO in image.layers else None
+    image.pixels = denoise(noisy, *guides, prefilter=not options.no_prefilter, threads=max(options.threads, 0))
+    image.film_state = None  # of the noisy picture: it would go on as such in a merge
+    write_image(options.output, image, options.depth)
+    print(f"{options.output}: denoised with {'guides' if guides[0] is not None else 'no guides'}")
     return 0
 
 

@@ -19,7 +19,10 @@ _PREFIX = "vlp:"  # of this package's attributes, each holding one JSON value
 _BLENDER_PREFIX = "VLP_BPT."  # of what the add-on stamps into files that Blender writes, plain text
 _HALF_MAX = 65504.0
 _STATE = "vlp_bpt.sums"  # the part of an EXR file that holds a film state
-_STATE_CHANNELS = tuple(f"sum.{i:02}" for i in range(16))  # file order is alphabetical
+_WORDS = 4  # of 32 bits, in a sum
+# Pictures that a file keeps beside its own, under Cycles' names: the picture before denoising, and what guided that.
+NOISY, ALBEDO, NORMAL = "Noisy Image", "Denoising Albedo", "Denoising Normal"
+_LAYERS = {NOISY: "RGBA", ALBEDO: "RGB", NORMAL: "XYZ"}  # their channels
 
 
 class Depth(StrEnum):
@@ -39,12 +42,14 @@ class Image:
     """A picture: pixels (height, width, 4) float32, linear Rec. 709, premultiplied alpha, row 0 at the bottom.
 
     metadata: what is known about it, as JSON values; a render's are those of `Renderer.metadata`. film_state: the exact
-    sums behind the pixels (height, width, 4, 2) int64, for `merge`; None where they are not kept.
+    sums behind the pixels (height, width, 4 or 13, 2) int64, for `merge`; None where they are not kept. layers: further
+    pictures (height, width, 4 or 3) under the names NOISY, ALBEDO and NORMAL, where it was denoised.
     """
 
     pixels: NDArray[np.float32]
     metadata: dict[str, Any] = field(default_factory=dict)
     film_state: NDArray[np.int64] | None = None
+    layers: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
 
 def check_output(path: str | Path, depth: Depth | None = None) -> Depth:
@@ -65,8 +70,8 @@ def check_output(path: str | Path, depth: Depth | None = None) -> Depth:
 def write_image(path: str | Path, image: Image, depth: Depth | None = None) -> None:
     """Writes .exr (linear float or half) or .png (sRGB-encoded 8 or 16 bits, alpha not premultiplied).
 
-    The file appears whole or not at all. Metadata goes into attributes named `vlp:...`; a film state into a second part
-    of an .exr. Raises ImageError naming the file.
+    The file appears whole or not at all. Metadata goes into attributes named `vlp:...`; layers of an .exr into further
+    channels, a film state into a second part. Raises ImageError naming the file.
     """
     from . import __version__
 
@@ -76,13 +81,18 @@ def write_image(path: str | Path, image: Image, depth: Depth | None = None) -> N
     oiio = _oiio()
     formats = {Depth.FLOAT: oiio.FLOAT, Depth.HALF: oiio.HALF, Depth.INT8: oiio.UINT8, Depth.INT16: oiio.UINT16}
     pixels = np.asarray(image.pixels, dtype=np.float32)[::-1]
+    names = ["R", "G", "B", "A"][: pixels.shape[2]]
+    if path.suffix.lower() == ".exr":
+        for layer, picture in image.layers.items():
+            pixels = np.concatenate([pixels, picture[::-1]], axis=2)
+            names += [f"{layer}.{channel}" for channel in _LAYERS[layer]]
     if depth in (Depth.INT8, Depth.INT16):
         pixels = _to_integers(pixels, depth)
     elif depth == Depth.HALF:
         pixels = np.clip(pixels, -_HALF_MAX, _HALF_MAX)
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, formats[depth])
-    spec.channelnames = ("R", "G", "B", "A")[:channels]
+    spec.channelnames = tuple(names[:channels])
     spec.attribute("Software", f"VLP-BPT {__version__}")
     spec.attribute("compression", "zip")
     for name, value in image.metadata.items():
@@ -125,10 +135,13 @@ def read_image(path: str | Path) -> Image:
         except ValueError:
             raise ImageError(f"'{path}': its VLP-BPT metadata is damaged") from None
         known |= {name: str(value) for name, value in metadata.items() if name.startswith(_BLENDER_PREFIX)}
-        pixels = _to_rgba(raw.reshape(spec.height, spec.width, spec.nchannels), list(spec.channelnames))
+        raw, names = raw.reshape(spec.height, spec.width, spec.nchannels), list(spec.channelnames)
+        pixels, layers = _to_rgba(raw, names), _layers(raw, names)
         if spec.format.basetype in (oiio.UINT8, oiio.UINT16, oiio.UINT32):
             pixels[..., :3] = srgb_decode(pixels[..., :3]) * pixels[..., 3:]
-        return Image(np.ascontiguousarray(pixels[::-1]), known, _read_state(oiio, file, path))
+        image = Image(np.ascontiguousarray(pixels[::-1]), known, layers=layers)
+        _read_further_parts(oiio, file, path, image)
+        return image
     finally:
         file.close()
 
@@ -165,6 +178,17 @@ def _to_rgba(raw: NDArray[np.float32], names: list[str]) -> NDArray[np.float32]:
     return rgba
 
 
+def _layers(raw: NDArray[np.float32], names: list[str]) -> dict[str, NDArray[np.float32]]:
+    """Those of the first view layer that has them; only whole ones."""
+    found = {}
+    for layer, channels in _LAYERS.items():
+        first = next((name for name in names if name.split(".")[-2:] == [layer, channels[0]]), None)
+        wanted = [f"{first[:-1]}{channel}" for channel in channels] if first is not None else []
+        if wanted and all(name in names for name in wanted):
+            found[layer] = np.ascontiguousarray(raw[::-1][..., [names.index(name) for name in wanted]])
+    return found
+
+
 def _place_window(spec: Any, film: dict[str, Any] | None) -> None:
     """Tells where in the whole picture the rendered window lies; files count y from the top."""
     if film is not None:
@@ -175,9 +199,10 @@ def _place_window(spec: Any, film: dict[str, Any] | None) -> None:
 
 
 def _state_part(oiio: Any, picture: Any, state: NDArray[np.int64]) -> tuple[Any, NDArray[Any]]:
-    words = np.ascontiguousarray(state[::-1]).astype("<i8").view("<u4").reshape(picture.height, picture.width, 16)
-    spec = oiio.ImageSpec(picture.width, picture.height, 16, oiio.UINT32)
-    spec.channelnames = _STATE_CHANNELS
+    count = _WORDS * state.shape[2]
+    words = np.ascontiguousarray(state[::-1]).astype("<i8").view("<u4").reshape(picture.height, picture.width, count)
+    spec = oiio.ImageSpec(picture.width, picture.height, count, oiio.UINT32)
+    spec.channelnames = _state_channels(count)
     for name in ("x", "y", "full_x", "full_y", "full_width", "full_height"):
         setattr(spec, name, getattr(picture, name))
     spec.attribute("compression", "zip")
@@ -186,15 +211,34 @@ def _state_part(oiio: Any, picture: Any, state: NDArray[np.int64]) -> tuple[Any,
     return spec, np.ascontiguousarray(words)
 
 
-def _read_state(oiio: Any, file: Any, path: Path) -> NDArray[np.int64] | None:
-    if not file.seek_subimage(1, 0) or file.spec().get_string_attribute("oiio:subimagename") != _STATE:
-        return None
+def _state_channels(count: int) -> tuple[str, ...]:
+    return tuple(f"sum.{i:02}" for i in range(count))  # file order is alphabetical
+
+
+def _read_further_parts(oiio: Any, file: Any, path: Path, image: Image) -> None:
+    """The exact sums, and layers where Blender gave each a part of its own."""
+    part = 1
+    while file.seek_subimage(part, 0):
+        spec = file.spec()
+        if spec.get_string_attribute("oiio:subimagename") == _STATE:
+            image.film_state = _read_state(oiio, file, part, path)
+        elif (spec.height, spec.width) == image.pixels.shape[:2]:
+            raw = file.read_image(part, 0, 0, spec.nchannels, oiio.FLOAT)
+            if raw is None:
+                raise ImageError(f"'{path}': cannot be read: {file.geterror()}")
+            found = _layers(raw.reshape(spec.height, spec.width, spec.nchannels), list(spec.channelnames))
+            image.layers = found | image.layers
+        part += 1
+
+
+def _read_state(oiio: Any, file: Any, part: int, path: Path) -> NDArray[np.int64]:
     spec = file.spec()
-    words = file.read_image(1, 0, 0, spec.nchannels, oiio.UINT32)
-    if words is None or spec.channelnames != _STATE_CHANNELS:
+    words = file.read_image(part, 0, 0, spec.nchannels, oiio.UINT32)
+    count = spec.nchannels
+    if words is None or count % _WORDS or spec.channelnames != _state_channels(count):
         raise ImageError(f"'{path}': its exact sums cannot be read: {file.geterror()}")
-    state = np.ascontiguousarray(words.reshape(spec.height, spec.width, 16)[::-1], dtype="<u4").view("<i8")
-    return state.astype(np.int64).reshape(spec.height, spec.width, 4, 2)
+    state = np.ascontiguousarray(words.reshape(spec.height, spec.width, count)[::-1], dtype="<u4").view("<i8")
+    return state.astype(np.int64).reshape(spec.height, spec.width, count // _WORDS, 2)
 
 
 def _write_parts(oiio: Any, path: Path, parts: list[tuple[Any, NDArray[Any]]]) -> None:

@@ -13,7 +13,8 @@ from .scene import Film, Scene
 from .settings import Mode, RenderSettings
 
 # What may differ between the parts of one render: how much and where they computed.
-_FREE_SETTINGS = ("samples", "time_limit", "device", "threads")
+_FREE_SETTINGS = ("samples", "time_limit", "device", "threads", "denoise_prefilter")
+_OF_DENOISING = ("denoised", "denoise_seconds")  # metadata of each picture by itself
 
 
 def merge_images(paths: Sequence[str | Path]) -> Image:
@@ -38,22 +39,26 @@ def merge_images(paths: Sequence[str | Path]) -> Image:
     film = Film(
         first.metadata["film"]["width"], first.metadata["film"]["height"], tuple(first.metadata["film"]["window"])
     )
-    summing = Renderer(
-        Scene(film=film), RenderSettings(mode=Mode.PAPER, light_paths=1, threads=1)
-    )  # for its film alone
+    denoising = {name: first.metadata["settings"].get(name, False) for name in ("denoise", "denoise_prefilter")}
+    summing = Renderer(  # for its film alone
+        Scene(film=film), RenderSettings(mode=Mode.PAPER, light_paths=1, **denoising)
+    )
+    shape = summing.film_state().shape
     for path, image in parts:
-        _, _, width, height = film.render_window
-        if image.film_state is None or image.film_state.shape != (height, width, 4, 2):
+        if image.film_state is None or image.film_state.shape != shape:
             raise ImageError(f"'{path}': its exact sums have another size than its film")
         summing.add_film_state(image.film_state, image.metadata["iterations"])
-    metadata = first.metadata | {
+    metadata = {name: value for name, value in first.metadata.items() if name not in _OF_DENOISING} | {
         "settings": first.metadata["settings"] | {"samples": summing.iterations},
         "iterations": summing.iterations,
         "ranges": ranges,
         "seconds": round(sum(image.metadata.get("seconds", 0.0) for _, image in parts), 3),
         "statistics": _summed([image.metadata.get("statistics", {}) for _, image in parts]),
     }
-    return Image(summing.read(), metadata, summing.film_state())
+    merged = summing.picture()
+    merged.metadata = metadata | {name: merged.metadata[name] for name in _OF_DENOISING if name in merged.metadata}
+    merged.film_state = summing.film_state()
+    return merged
 
 
 def _check_same_render(path: Path, metadata: dict[str, Any], other_path: Path, other: dict[str, Any]) -> None:

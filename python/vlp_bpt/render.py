@@ -13,9 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from . import denoise
 from .changes import changes, kept
 from .errors import Cancelled, DeviceError, Error, SceneError
-from .images import Image
+from .images import ALBEDO, NOISY, NORMAL, Image
 from .scene import Scene
 from .settings import RenderSettings
 from .upload import upload, upload_changes
@@ -48,7 +49,8 @@ class Progress:
 @dataclass(frozen=True)
 class Statistics:
     """What a render did and took. eye_samples and light_paths: in all; memory: bytes by device and part; dropped:
-    non-finite samples left out; build_seconds: uploading the scene and building its hierarchy, as far as it changed."""
+    non-finite samples left out; build_seconds: uploading the scene and building its hierarchy, as far as it changed;
+    denoise_seconds: of denoising the last picture, not part of seconds."""
 
     iterations: int
     seconds: float
@@ -58,6 +60,7 @@ class Statistics:
     vlps: int
     dropped: int
     memory: dict[str, dict[str, int]]
+    denoise_seconds: float = 0.0
 
     @property
     def eye_samples_per_second(self) -> float:
@@ -75,14 +78,15 @@ class Statistics:
 class Renderer:
     """Renders one scene with one set of settings, iteration after iteration.
 
-    Raises SceneError or SettingsError for what cannot be rendered, DeviceError when the device fails. `first_iteration`
+    Raises SceneError or SettingsError for what cannot be rendered, DeviceError when the device fails or there is no
+    library to denoise with. `first_iteration`
     begins a later range of the same render: ranges rendered apart merge to the picture that one render makes.
     `warnings` are about the scene, and about devices that are not what was asked for, also once one fails during a
     render, which then goes on without it. Calls may come from any thread; `iterate` and `read` wait for each other.
     """
 
     def __init__(self, scene: Scene, settings: RenderSettings | None = None, *, first_iteration: int = 0) -> None:
-        self._scene_warnings = scene.validate()
+        self._warnings = scene.validate()
         self.film = scene.film
         self._asked = settings or RenderSettings()
         self.settings = self._checked(self._asked, scene, first_iteration)
@@ -90,7 +94,9 @@ class Renderer:
         self.interrupted = False  # the last `render` was ended by KeyboardInterrupt
         self._lock = threading.Lock()
         self._stop = threading.Event()
-        self._seconds = 0.0
+        self._seconds = self._denoise_seconds = 0.0
+        if self.settings.denoise:
+            denoise.load()  # not only after an hour
         started = time.perf_counter()
         with native_errors():
             self._scene = _built_scene(scene, self.settings.threads)
@@ -111,6 +117,8 @@ class Renderer:
         warnings = validate(new_scene, geometry_is_known=not changed.geometry)
         asked = settings or self._asked
         new_settings = self._checked(asked, new_scene, self.first_iteration)
+        if new_settings.denoise:
+            denoise.load()
         same_devices = (new_settings.device, new_settings.threads) == (self.settings.device, self.settings.threads)
         with self._lock, native_errors():
             started = time.perf_counter()
@@ -121,13 +129,13 @@ class Renderer:
                 upload_changes(new_scene, changed, self._scene)
                 self._scene.build(new_settings.threads)
             self._known = kept(new_scene)
-            self._scene_warnings, self.film = warnings, new_scene.film
+            self._warnings, self.film = warnings, new_scene.film
             self._asked, self.settings = asked, new_settings
             if same_devices:
                 self._native.update(self._scene, self._options())
             else:
                 self._native = load_native().Renderer(self._scene, self._options())
-            self._seconds = 0.0
+            self._seconds = self._denoise_seconds = 0.0
             self._build_seconds = time.perf_counter() - started
 
     @staticmethod
@@ -143,7 +151,7 @@ class Renderer:
     @property
     def warnings(self) -> list[str]:
         """What the user should hear, in whole sentences."""
-        return self._scene_warnings + list(self._native.notes)
+        return self._warnings + list(self._native.notes)
 
     @property
     def iterations(self) -> int:
@@ -169,6 +177,7 @@ class Renderer:
             vlps=int(self._native.vlps),
             dropped=int(self._native.dropped),
             memory=self.memory,
+            denoise_seconds=self._denoise_seconds,
         )
 
     @property
@@ -202,10 +211,12 @@ class Renderer:
         self._native.cancel()
 
     def render(self, progress: Callable[[Progress], None] | None = None, cancel: CancelFlag | None = None) -> Image:
-        """Renders `settings.samples` iterations, or fewer when `time_limit` ends them; returns the picture.
+        """Renders `settings.samples` iterations, or fewer when `time_limit` ends them; returns `picture()`.
 
         `progress` is called on the calling thread at least four times a second. Setting `cancel`, `cancel()` and
         KeyboardInterrupt all end the render and keep its picture; one iteration is completed whatever the time limit.
+        `cancel` and `cancel()` leave the picture noisy, also when they come while it is denoised; so does a second
+        KeyboardInterrupt.
         Raises Cancelled when it was stopped before the first iteration was complete.
         """
         self._stop.clear()
@@ -217,7 +228,46 @@ class Renderer:
             self.interrupted = True
         if self.iterations == 0:
             raise Cancelled("render: cancelled before its first iteration was complete")
-        return Image(self.read(), self.metadata())
+        try:
+            return self.picture(lambda: self._stop.is_set() or (cancel is not None and cancel.is_set()))
+        except KeyboardInterrupt:
+            self.interrupted = True
+            return Image(self.read(), self.metadata(), layers=self.layers())
+
+    def picture(self, cancelled: Callable[[], bool] | None = None) -> Image:
+        """The picture of the complete iterations, denoised where `settings.denoise` asks for it, with `layers`.
+
+        It stays noisy where `cancelled`, asked about 20 times a second, says so, or where the denoiser fails, of which
+        there is a warning then.
+        """
+        image = Image(self.read(), self.metadata(), layers=self.layers())
+        if not self.settings.denoise:
+            return image
+        started = time.perf_counter()
+        try:
+            color = denoise.denoise(
+                *self._guided(),
+                prefilter=self.settings.denoise_prefilter,
+                threads=self.settings.threads,
+                cancelled=cancelled,
+            )
+        except Cancelled:
+            return image
+        except DeviceError as error:
+            self._warnings.append(str(error))
+            return image
+        self._denoise_seconds = time.perf_counter() - started
+        image.pixels = np.concatenate([color, image.pixels[..., 3:]], axis=2)
+        image.metadata |= {"denoised": True, "denoise_seconds": round(self._denoise_seconds, 3)}
+        return image
+
+    def layers(self) -> dict[str, NDArray[np.float32]]:
+        """What files keep beside the denoised picture, by the names of `vlp_bpt.images`; nothing without
+        `settings.denoise`. NOISY is `read`'s; ALBEDO and NORMAL (in world space) are (height, width, 3)."""
+        if not self.settings.denoise:
+            return {}
+        _, albedo, normal = self._guided()
+        return {NOISY: self.read(), ALBEDO: albedo, NORMAL: normal}
 
     def read(self, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
         """The mean picture of the complete iterations: (height, width, 4) of the window, linear premultiplied RGBA
@@ -230,7 +280,8 @@ class Renderer:
         return out
 
     def film_state(self) -> NDArray[np.int64]:
-        """The exact sums behind the picture: (height, width, 4, 2) int64, 128-bit fixed point as low and high words."""
+        """The exact sums behind the picture: (height, width, 4, 2) int64, 128-bit fixed point as low and high words; 13
+        in place of 4 with `settings.denoise`."""
         with self._lock, native_errors():
             return np.asarray(self._native.film_state()).view(np.int64)
 
@@ -266,6 +317,15 @@ class Renderer:
             "film": {"width": self.film.width, "height": self.film.height, "window": list(self.film.render_window)},
             "statistics": {name: statistics[name] for name in ("eye_samples", "light_paths", "dropped")},
         }
+
+    def _guided(self) -> tuple[NDArray[np.float32], ...]:
+        """What the denoiser gets: colour, albedo and normal, (height, width, 3). The colour is `read`'s but for splats,
+        each of which is in one pixel: noise that neighbours share would pass for texture."""
+        _, _, width, height = self.film.render_window
+        images = tuple(np.empty((height, width, 3), dtype=np.float32) for _ in range(3))
+        with self._lock, native_errors():
+            self._native.read_guided(*images)
+        return images
 
     def _iterate(self, count: int, poll: Callable[[], bool] | None) -> int:
         outcome: list[int | BaseException] = []

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from vlp_bpt.errors import Cancelled
+from vlp_bpt.images import Image
 from vlp_bpt.render import Progress, Statistics
 from vlp_bpt.settings import RenderSettings
 
@@ -33,7 +34,7 @@ class FakeRenderer:
         count = self.iterations
         return Statistics(count, 1.5 * count, 0.1, 1000 * count, 500 * count, 42, 0, {"CPU": {"film": 2**20}})
 
-    def render(self, progress: Callable[[Progress], None], cancel: Any) -> None:
+    def render(self, progress: Callable[[Progress], None], cancel: Any) -> Image:
         samples = self.settings.samples
         for iteration in range(samples):
             ends = time.perf_counter() + self.seconds_per_iteration
@@ -48,6 +49,11 @@ class FakeRenderer:
         self.finished_at = time.perf_counter()
         if self.iterations == 0:
             raise Cancelled("cancelled")
+        _, _, width, height = self.scene.film.render_window
+        return Image(self.read(np.empty((height, width, 4), np.float32)))
+
+    def layers(self) -> dict[str, Any]:
+        return {}
 
     def lost_light(self) -> tuple[float, float]:
         return 0.021, 0.004

@@ -71,6 +71,19 @@ TEST(BvhWatertight, ThinSlices) {  // slivers that meet at the poles
     expect_no_leak(mesh, scene, {0, 0, 0}, 0.5f, 200000, 8);
 }
 
+TEST(BvhWatertight, CutSlices) {  // slivers at all angles, whose boxes are cut before the tree is built
+    Mesh mesh = make_ball(6, 3000);
+    std::mt19937 random(3);
+    Affine turn = random_affine(random, 1, 1);
+    for (auto& row : turn.m) row[3] = 0;
+    mesh.map(turn);
+    RayScene scene;
+    scene.place(scene.add(mesh));
+    scene.build();
+    ASSERT_GT(scene.bvh.triangle_blocks.size() * k_block_width, mesh.triangles.size() * 3 / 2) << "parts of triangles";
+    expect_no_leak(mesh, scene, {0, 0, 0}, 0.2f, 200000, 8);
+}
+
 TEST(BvhWatertight, Instances) {
     const Mesh mesh = make_ball(40, 80, 0.1f);
     std::mt19937 random(9);

@@ -177,6 +177,59 @@ TEST(Film, ReadsTheMean) {
     }
 }
 
+TEST(Film, KeepsGuidesAndSplatsOfOnePixel) {
+    const Window window{0, 0, 2, 3};
+    Film whole(window, true, true), part(window, true, true);
+    ASSERT_EQ(whole.channels(), 13u);
+    for (uint32_t i = 0; i < 4; ++i) {
+        Film& film = i < 3 ? whole : part;
+        film.clear_splats(0, 3);
+        for (PixelSample& p : film.frame()) p = {{1, 2, 3, 1}};
+        for (ExactSum& s : film.splats()) s.add(0.5f);
+        for (ExactSum& s : film.point_splats()) s.add(static_cast<float>(i));
+        for (GuideSample& g : film.guide_frame())
+            g = {{0.25f, static_cast<float>(i), 3}, {-1, 0, i < 2 ? 1.0f : -1.0f}};
+        film.commit_rows(0, 3);
+        film.count_iteration();
+    }
+    whole.add(part.sums(), part.iterations());
+    std::vector<float> rgba(24), color(18), albedo(18), normal(18);
+    whole.read(rgba);
+    whole.read_guided(color, albedo, normal);
+    for (size_t pixel = 0; pixel < 6; ++pixel) {
+        for (size_t c = 0; c < 3; ++c) {
+            EXPECT_EQ(rgba[4 * pixel + c], static_cast<float>(c) + 1.5f);
+            EXPECT_EQ(color[3 * pixel + c], static_cast<float>(c) + 1 + 1.5f);  // the mean of 0, 1, 2, 3
+        }
+        EXPECT_EQ(rgba[4 * pixel + 3], 1);
+        EXPECT_EQ(albedo[3 * pixel], 0.25f);
+        EXPECT_EQ(albedo[3 * pixel + 1], 1);  // no more
+        EXPECT_EQ(albedo[3 * pixel + 2], 1);
+        EXPECT_EQ(normal[3 * pixel], -1);
+        EXPECT_EQ(normal[3 * pixel + 1], 0);
+        EXPECT_EQ(normal[3 * pixel + 2], 0);
+    }
+}
+
+TEST(Film, ReadsGuidesOfTheFirstUnfinishedFrame) {
+    Film film({0, 0, 1, 1}, false, true);
+    film.frame()[0] = {{1, 2, 3, 1}};
+    film.guide_frame()[0] = {{0.5f, 0, 2}, {0, 0, -1}};
+    std::vector<float> color(3), albedo(3), normal(3);
+    film.read_guided(color, albedo, normal);
+    EXPECT_EQ(color, (std::vector<float>{1, 2, 3}));
+    EXPECT_EQ(albedo, (std::vector<float>{0.5f, 0, 1}));
+    EXPECT_EQ(normal, (std::vector<float>{0, 0, -1}));
+}
+
+TEST(Film, RefusesGuidesThatItDoesNotKeep) {
+    Film plain({0, 0, 2, 3}), guided({0, 0, 2, 3}, false, true);
+    std::vector<float> right(18), wrong(24);
+    EXPECT_THROW(plain.read_guided(right, right, right), std::invalid_argument);
+    EXPECT_THROW(guided.read_guided(right, wrong, right), std::invalid_argument);
+    EXPECT_THROW(guided.add(plain.sums(), 1), std::invalid_argument);
+}
+
 TEST(Film, RefusesOtherSizes) {
     Film film({0, 0, 2, 3}), other({0, 0, 3, 3});
     std::vector<float> rgba(20);

@@ -38,7 +38,11 @@ std::vector<NamedPass> passes() {
     PassSettings many = balanced();
     many.light_path_length = many.eye_path_length = k_max_walk;
     many.vlp_connections = 2, many.vlp_candidates = 3, many.light_samples = 0;
+    PassSettings guided = balanced(), guided_alone = path_tracing;
+    guided.guides = guided_alone.guides = true;
     return {{"paper", paper},
+            {"guided", guided},
+            {"guided_path_tracing", guided_alone},
             {"balanced", balanced()},
             {"splats_alone", splats_alone},
             {"path_tracing", path_tracing},
@@ -50,7 +54,7 @@ std::shared_ptr<Scene> room(uint32_t pixels = 24) { return crowded_room(every_li
 // The sums of iterations [0, count) by the CPU.
 std::vector<ExactSum> cpu_sums(const Scene& scene, const PassSettings& pass, uint32_t count) {
     const auto cpu = make_cpu_backend(scene, pass, 1);
-    Film film(scene.window(), pass.splats);
+    Film film(scene.window(), pass.splats, pass.guides);
     const std::atomic<bool> go_on{false};
     for (uint32_t i = 0; i < count; ++i) EXPECT_TRUE(cpu->run_iteration(i, film, go_on));
     return {film.sums().begin(), film.sums().end()};
@@ -82,7 +86,7 @@ TEST_P(GpuPasses, MakeTheCpusSums) {
         HostMachine machine;
         machine.eager = eager;
         HostBackend gpu(*scene, pass, machine);
-        Film film(scene->window(), pass.splats);
+        Film film(scene->window(), pass.splats, pass.guides);
         const std::atomic<bool> go_on{false};
         for (uint32_t i = 0; i < 5; ++i) {
             EXPECT_TRUE(gpu.run_iteration(i, film, go_on));

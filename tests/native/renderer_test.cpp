@@ -161,7 +161,7 @@ TEST(TwoDevices, TheHelperGoesOnAloneWhenTheOtherFails) {
     EXPECT_EQ(pair.renderer->dropped(), 16u);
 }
 
-// Two CPU back ends with splats: the sums are bit for bit those of one.
+// Two CPU back ends with splats and guides: the sums are bit for bit those of one, and the picture's those without guides.
 TEST(TwoDevices, MakeThePictureOfOne) {
     const std::shared_ptr<Scene> scene = crowded_room(every_light().front().add, 24, {});
     PassSettings pass;
@@ -169,14 +169,21 @@ TEST(TwoDevices, MakeThePictureOfOne) {
     pass.splats = true, pass.roulette = true;
     pass = for_scene(scene->view(), pass);
     const auto cpu = [&] { return make_cpu_backend(*scene, pass, 1); };
+    Renderer plain(scene, pass, scene->window(), Devices{cpu(), nullptr, {}, {}}, 3, 15);
+    pass.guides = true;
     Renderer one(scene, pass, scene->window(), Devices{cpu(), nullptr, {}, {}}, 3, 15);
     Renderer two(scene, pass, scene->window(), Devices{cpu(), cpu(), {}, {}}, 3, 15);
+    EXPECT_EQ(plain.iterate(12), 12u);
     EXPECT_EQ(one.iterate(12), 12u);
     EXPECT_EQ(two.iterate(12), 12u);
     EXPECT_EQ(two.iterations().finished(), (Ranges{{3, 15}}));
     const auto a = one.film().sums(), b = two.film().sums();
-    EXPECT_GT(a[4 * (12 * 24 + 12)].value(), 0);
+    ASSERT_EQ(a.size(), 13u * 24 * 24);
+    for (size_t c = 0; c < 13; ++c) EXPECT_GT(a[13 * (12 * 24 + 12) + c].value(), 0);
     EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size_bytes()), 0);
+    for (size_t pixel = 0; pixel < size_t{24} * 24; ++pixel) {
+        EXPECT_EQ(std::memcmp(&a[13 * pixel], &plain.film().sums()[4 * pixel], 4 * sizeof(ExactSum)), 0);
+    }
 }
 
 // As a progress display does; a sanitizer for threads has something to find here.

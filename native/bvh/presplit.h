@@ -1,0 +1,15 @@
+// Cuts the boxes of triangles that fill them badly, long ones at an angle above all, before the tree is built.
+#pragma once
+
+#include "bvh/collapse.h"
+
+namespace vlp {
+
+// The budget: this many cuts, and one more for so many refs.
+inline constexpr uint32_t k_free_splits = 100000, k_refs_per_split = 4;
+
+// Adds refs of parts of triangles, within the budget, and narrows the first part's ref. The result depends on the refs
+// alone, not on the number of threads (after Karras & Aila 2013, section 4.4).
+void presplit(std::vector<Ref>& refs, const LeafSource& source, ThreadPool& pool);
+
+}  // namespace vlp
