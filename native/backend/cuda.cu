@@ -37,6 +37,10 @@ size_t stack_bytes_of() {
     return kernel.localSizeBytes * static_cast<size_t>(processors) * static_cast<size_t>(threads);
 }
 
+size_t most_stack_bytes() {
+    return std::max({stack_bytes_of<LightPass>(), stack_bytes_of<EyePass>(), stack_bytes_of<GuidedEyePass>()});
+}
+
 class CudaDevice {
 public:
     static constexpr const char* k_name = "CUDA";
@@ -112,7 +116,7 @@ public:
         return state == cudaSuccess;
     }
 
-    size_t stack_bytes() const { return std::max({stack_bytes_of<LightPass>(), stack_bytes_of<EyePass>(), stack_bytes_of<GuidedEyePass>()}); }
+    size_t stack_bytes() const { return most_stack_bytes(); }
 
 private:
     cudaStream_t stream(Queue in) const { return in == Queue::passes ? passes_ : copies_; }
@@ -141,9 +145,6 @@ std::vector<DeviceInfo> cuda_devices() {
     return devices;
 }
 
-size_t cuda_stack_bytes() {
-    if (cuda_devices().empty()) return 0;
-    return std::max({stack_bytes_of<LightPass>(), stack_bytes_of<EyePass>(), stack_bytes_of<GuidedEyePass>()});
-}
+size_t cuda_stack_bytes() { return cuda_devices().empty() ? 0 : most_stack_bytes(); }
 
 }  // namespace vlp

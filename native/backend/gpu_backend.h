@@ -67,13 +67,15 @@ public:
         const bool has_vlps = pass_.kappa > 0;
         const EyePass eye{scene_,         pass_,         iteration,     window_, has_vlps ? slots_.data() : nullptr,
                           stored_.data(), frame_.data(), counts_.data()};
-        const GuidedEyePass guided{eye, guides_.data()};
-        const bool whole = pass_.guides ? launch_in_batches(pixels(), guided, stop) : launch_in_batches(pixels(), eye, stop);
-        if (!whole) return false;
+        const bool went_on = pass_.guides ? launch_in_batches(pixels(), GuidedEyePass{eye, guides_.data()}, stop)
+                                          : launch_in_batches(pixels(), eye, stop);
+        if (!went_on) return false;
         device_.download(Queue::passes, counts_here_.data(), counts_.data(), counts_.bytes());
         if (downloading_ > 0) device_.queue_wait(Queue::passes, downloaded_);
-        const Commit commit{frame_.data(), guides_.data(), splats_.data(), point_splats_.data(), sums_.data(), kept_ == 0};
-        device_.launch(0, film_channels(pass_.guides) * pixels(), commit);
+        const auto channels = static_cast<uint32_t>(film_channels(pass_));
+        device_.launch(0, channels * pixels(),
+                       Commit{frame_.data(), guides_.data(), splats_.data(), point_splats_.data(), sums_.data(),
+                              channels, kept_ == 0});
         splats_are_clear_ = true;
         ++kept_;
         return true;
@@ -175,9 +177,9 @@ private:
         const size_t pixels = window.pixel_count();
         resize(frame_, pixels, "the film");
         resize(guides_, pass.guides ? pixels : 0, "a denoiser's guides");
-        resize(sums_, pixels * film_channels(pass.guides), "the film's sums");
+        resize(sums_, pixels * film_channels(pass), "the film's sums");
         resize(splats_, pass.splats ? pixels * 3 : 0, "splats");
-        resize(point_splats_, pass.splats && pass.guides ? pixels * 3 : 0, "a denoiser's splats");
+        resize(point_splats_, pass.splats && pass.guides ? pixels * 3 : 0, "splats");
         if (sums_here_.size() != sums_.size()) {
             sums_here_ = {};
             sums_here_ = Buffer<ExactSum>(device_, sums_.size(), "the film's sums on the host", true);

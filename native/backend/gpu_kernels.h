@@ -68,12 +68,6 @@ struct EyePass {
     PixelSample* frame;
     PassCounts* counts;
 
-    VLP_HD void operator()(uint32_t pixel) const {
-        PixelSink sink{pass};
-        trace(pixel, sink, sink);
-    }
-
-    // `found` is the part of the sink that sums up the pixel.
     template <typename Sink>
     VLP_HD void trace(uint32_t pixel, Sink& sink, const PixelSink& found) const {
         const uint32_t x = window.x + pixel % window.width, y = window.y + pixel / window.width;
@@ -82,9 +76,13 @@ struct EyePass {
         if (found.dropped > 0) AtomicAdd{}(counts->dropped, found.dropped);
         frame[pixel] = {{found.radiance.r, found.radiance.g, found.radiance.b, alpha}};
     }
+    VLP_HD void operator()(uint32_t pixel) const {
+        PixelSink sink{pass};
+        trace(pixel, sink, sink);
+    }
 };
 
-// The same with guides. A pass of its own: without them the eye pass has no code for them.
+// The same with a denoiser's guides: a kernel of its own, so that the eye pass has no code for them.
 struct GuidedEyePass {
     EyePass eye;
     GuideSample* guides;
@@ -96,25 +94,35 @@ struct GuidedEyePass {
     }
 };
 
-// Adds an iteration to the sums, one number of a pixel at a time, and clears its splats. `anew`: the sums hold nothing yet.
+// Adds an iteration to the sums, one channel of a pixel at a time, as Film::commit_rows does, and clears its splats. `anew`:
+// the sums hold nothing yet.
 struct Commit {
     const PixelSample* frame;
-    const GuideSample* guides;         // null: none
+    const GuideSample* guides;        // may be null
     ExactSum *splats, *point_splats;  // may be null
     ExactSum* sums;
+    uint32_t channels;
     bool anew;
 
     VLP_HD void operator()(uint32_t i) const {
-        const uint32_t channels = film_channels(guides != nullptr), pixel = i / channels, channel = i % channels;
+        const uint32_t pixel = i / channels, channel = i % channels;
         ExactSum sum = anew ? ExactSum{} : sums[i];
-        sum.add(film_value(frame[pixel], guides ? guides + pixel : nullptr, channel));
-        if (splats && channel < 3) take(splats[size_t{3} * pixel + channel], sum);
-        if (point_splats && channel >= 4 && channel < 7) take(point_splats[size_t{3} * pixel + channel - 4], sum);
+        if (channel < 4) {
+            sum.add(frame[pixel].rgba[channel]);
+            if (channel < 3) move_to(sum, splats, pixel, channel);
+        } else if (channel < 7) {
+            sum.add(frame[pixel].rgba[channel - 4]);
+            move_to(sum, point_splats, pixel, channel - 4);
+        } else if (channel < 10) {
+            sum.add(guides[pixel].albedo[channel - 7]);
+        } else {
+            sum.add(max_of(guides[pixel].normal[channel - 10] + 1, 0.0f));
+        }
         sums[i] = sum;
     }
-
-private:
-    VLP_HD static void take(ExactSum& splat, ExactSum& sum) {
+    VLP_HD static void move_to(ExactSum& sum, ExactSum* of_pixels, uint32_t pixel, uint32_t channel) {
+        if (!of_pixels) return;
+        ExactSum& splat = of_pixels[size_t{3} * pixel + channel];
         sum.add(splat);
         splat = {};
     }

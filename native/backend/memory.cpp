@@ -28,7 +28,7 @@ void add_gpu_memory(MemoryByDevice& memory, const Scene& scene, const PassSettin
         gpu.work += pass.light_paths * (sizeof(uint32_t) + sizeof(uint8_t)) + scan_bytes(pass.light_paths);
     }
     // The sums come to the host through memory that stays in its place.
-    memory["CPU"].film += scene.window().pixel_count() * film_channels(pass.guides) * sizeof(ExactSum);
+    memory["CPU"].film += scene.window().pixel_count() * film_channels(pass) * sizeof(ExactSum);
     memory["CPU"].work += sizeof(PassCounts);
 }
 

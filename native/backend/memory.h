@@ -39,11 +39,11 @@ void add_gpu_memory(MemoryByDevice& memory, const Scene& scene, const PassSettin
 inline size_t light_vertex_capacity(const PassSettings& pass) {
     return static_cast<size_t>(pass.light_paths) * pass.light_path_length;
 }
-// With what the passes of one iteration write.
+inline size_t film_channels(const PassSettings& pass) { return pass.guides ? Film::k_guided_channels : 4; }
 inline size_t film_bytes(Window window, const PassSettings& pass) {
+    const size_t samples = sizeof(PixelSample) + (pass.guides ? sizeof(GuideSample) : 0);
     const size_t splats = pass.splats ? (pass.guides ? 6 : 3) : 0;
-    return window.pixel_count() * (sizeof(PixelSample) + (pass.guides ? sizeof(GuideSample) : 0) +
-                                   (film_channels(pass.guides) + splats) * sizeof(ExactSum));
+    return window.pixel_count() * (samples + (splats + film_channels(pass)) * sizeof(ExactSum));
 }
 
 // Arrays of a scene begin at cache lines of a device.

@@ -199,9 +199,10 @@ void bind_renderer(nb::module_& m) {
             nb::arg("out").noconvert())
         .def(
             "read_guided",
-            [](const Renderer& r, RgbPicture color, RgbPicture albedo, RgbPicture normal) {
+            [](Renderer& r, RgbPicture color, RgbPicture albedo, RgbPicture normal) {
                 for (const RgbPicture& picture : {color, albedo, normal}) require_size_of_film(r, picture, "picture");
                 nb::gil_scoped_release release;
+                r.settle();
                 r.film().read_guided({color.data(), color.size()}, {albedo.data(), albedo.size()},
                                      {normal.data(), normal.size()});
             },

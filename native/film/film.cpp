@@ -25,11 +25,13 @@ void Film::commit_rows(uint32_t begin, uint32_t end) {
     const size_t first = static_cast<size_t>(begin) * window_.width, last = static_cast<size_t>(end) * window_.width;
     ExactSum* sum = sums_.data() + first * channels();
     for (size_t i = first; i < last; ++i, sum += channels()) {
-        const GuideSample* const guide = has_guides() ? &guide_frame_[i] : nullptr;
-        for (uint32_t c = 0; c < channels(); ++c) sum[c].add(film_value(frame_[i], guide, c));
-        for (size_t c = 0; c < 3 && has_splats(); ++c) {
-            sum[c].add(splats_[3 * i + c]);
-            if (has_guides()) sum[4 + c].add(point_splats_[3 * i + c]);
+        for (size_t c = 0; c < 4; ++c) sum[c].add(frame_[i].rgba[c]);
+        for (size_t c = 0; c < 3 && has_splats(); ++c) sum[c].add(splats_[3 * i + c]);
+        for (size_t c = 0; c < 3 && has_guides(); ++c) {
+            sum[4 + c].add(frame_[i].rgba[c]);
+            if (has_splats()) sum[4 + c].add(point_splats_[3 * i + c]);
+            sum[7 + c].add(guide_frame_[i].albedo[c]);
+            sum[10 + c].add(std::max(guide_frame_[i].normal[c] + 1, 0.0f));  // unit vectors are rounded, too
         }
     }
 }

@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "core/vec.h"
 #include "film/exact_sum.h"
 #include "film/guide.h"
 #include "film/window.h"
@@ -17,20 +16,10 @@ struct PixelSample {
     float rgba[4] = {0, 0, 0, 0};
 };
 
-// Sums a pixel: red, green, blue and alpha; with guides then the colour to be denoised, 3, which has each splat in one pixel,
-// albedo, 3, and normal + 1, 3, as no sum may be negative.
-VLP_HD constexpr uint32_t film_channels(bool guides) { return guides ? 13 : 4; }
-
-// What an iteration adds to channel `c` of a pixel, but for splats.
-VLP_HD inline float film_value(const PixelSample& sample, const GuideSample* guide, uint32_t c) {
-    if (c < 4) return sample.rgba[c];
-    if (c < 7) return sample.rgba[c - 4];
-    if (c < 10) return guide->albedo[c - 7];
-    return max_of(guide->normal[c - 10] + 1, 0.0f);  // unit vectors are rounded, too
-}
-
 class Film {
 public:
+    static constexpr size_t k_guided_channels = 13;
+
     // `splats`: light paths splat on it. `guides`: it keeps those of a denoiser.
     explicit Film(Window window, bool splats = false, bool guides = false)
         : window_(window),
@@ -38,12 +27,14 @@ public:
           guide_frame_(guides ? window.pixel_count() : 0),
           splats_(splats ? window.pixel_count() * 3 : 0),
           point_splats_(splats && guides ? window.pixel_count() * 3 : 0),
-          sums_(window.pixel_count() * film_channels(guides)) {}
+          sums_(window.pixel_count() * (guides ? k_guided_channels : 4)) {}
 
     const Window& window() const { return window_; }
     bool has_splats() const { return !splats_.empty(); }
     bool has_guides() const { return !guide_frame_.empty(); }
-    size_t channels() const { return film_channels(has_guides()); }
+    // Sums a pixel: red, green, blue and alpha; with guides then the colour to be denoised, 3, which has each splat in one
+    // pixel, albedo, 3, and normal + 1, 3, as no sum may be negative.
+    size_t channels() const { return has_guides() ? k_guided_channels : 4; }
     // The iteration under way, row by row from the bottom; counts only once it is committed.
     std::span<PixelSample> frame() { return frame_; }
     std::span<GuideSample> guide_frame() { return guide_frame_; }

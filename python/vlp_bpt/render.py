@@ -117,6 +117,8 @@ class Renderer:
         warnings = validate(new_scene, geometry_is_known=not changed.geometry)
         asked = settings or self._asked
         new_settings = self._checked(asked, new_scene, self.first_iteration)
+        if new_settings.denoise:
+            denoise.load()
         same_devices = (new_settings.device, new_settings.threads) == (self.settings.device, self.settings.threads)
         with self._lock, native_errors():
             started = time.perf_counter()
@@ -127,13 +129,13 @@ class Renderer:
                 upload_changes(new_scene, changed, self._scene)
                 self._scene.build(new_settings.threads)
             self._known = kept(new_scene)
-            self._scene_warnings, self.film = warnings, new_scene.film
+            self._warnings, self.film = warnings, new_scene.film
             self._asked, self.settings = asked, new_settings
             if same_devices:
                 self._native.update(self._scene, self._options())
             else:
                 self._native = load_native().Renderer(self._scene, self._options())
-            self._seconds = 0.0
+            self._seconds = self._denoise_seconds = 0.0
             self._build_seconds = time.perf_counter() - started
 
     @staticmethod
