@@ -59,7 +59,7 @@ public:
         bool materials = false, lamps = false, world = false;
     };
     // After `build`: takes parts out, to be added anew before the next `build`, which makes only what depends on them. No
-    // view of the scene may be used until then. There must be a material for each that instances have.
+    // view of the scene may be used until then, nor by a renderer's helper (Renderer::rest). There must be a material for each that instances have.
     void reopen(Opened parts);
 
     const SceneView& view() const { return view_; }

@@ -122,6 +122,7 @@ class Renderer:
         same_devices = (new_settings.device, new_settings.threads) == (self.settings.device, self.settings.threads)
         with self._lock, native_errors():
             started = time.perf_counter()
+            self._native.rest()  # a helper may still be at work on the scene
             self._known = Scene()  # nothing of which anything can be taken over, should this fail
             if changed.geometry:
                 self._scene = _built_scene(new_scene, new_settings.threads)

@@ -421,6 +421,7 @@ TEST_F(GpuUpdate, WithTooManyLightPathsRendersFewer) {
 TEST_F(GpuUpdate, OfTwoDevicesReachesBoth) {
     GpuRender both(scene, balanced(), "HYBRID");
     EXPECT_EQ(both.renderer->iterate(4), 4u);
+    both.renderer->rest();
     scene->reopen({.lamps = true});
     scene->add_lamp(make_point({0, 0, 1.5f}, {9, 9, 9}, 0.1f).value(), 0);
     scene->build(1);
