@@ -147,6 +147,7 @@ _RENDER_EXAMPLES = """
 vlp-bpt render room.blend -o room.png
 vlp-bpt render room.blend -o room.exr --samples 500 --frame 12
 vlp-bpt render room.vlp.npz -o room.exr --time 60
+vlp-bpt render room.vlp.npz -o room.exr --samples 100000 --noise 0.01
 vlp-bpt render room.vlp.npz -o paper.exr --set mode=PAPER --set eye_path_length=5
 vlp-bpt render room.vlp.npz -o part.exr --iterations 500:1000   (then: vlp-bpt merge)
 vlp-bpt render room.vlp.npz --debug-strategies room --samples 64 --set light_path_length=2
@@ -165,6 +166,7 @@ def _add_render(render: argparse.ArgumentParser) -> None:
     render.add_argument("--frame", type=int, help="frame of a .blend (default: its current one)")
     render.add_argument("--samples", metavar="N", help="iterations to render")
     render.add_argument("--time", metavar="SECONDS", help="stop after this long, samples or not")
+    render.add_argument("--noise", metavar="X", help="stop once the noise is as low as X, such as 0.01, samples or not")
     render.add_argument("--device", metavar="NAME", help=f"one of {', '.join(Device)}")
     render.add_argument("--seed", metavar="N", help="another seed, other noise")
     render.add_argument(
@@ -216,7 +218,9 @@ def _render(options: argparse.Namespace) -> int:
     values = _setting_values(options)
     iterations = _iterations(options)
     if iterations is not None:
-        values["samples"] = iterations[1] - iterations[0]
+        if values.get("noise_threshold"):
+            raise UsageError("--iterations says how many iterations to render: leave the noise threshold out")
+        values |= {"samples": iterations[1] - iterations[0], "noise_threshold": 0.0}
     if kind == "blend" and iterations is None:
         return _render_blend(options, values)
     snapshot, warnings, settings = _scene_to_render(options, kind, values)
@@ -250,7 +254,7 @@ def _scene_to_render(
 
 
 def _render_strategies(options: argparse.Namespace, kind: str) -> int:
-    for name in ("output", "iterations", "time"):
+    for name in ("output", "iterations", "time", "noise"):
         if getattr(options, name) is not None:
             raise UsageError(f"--debug-strategies writes pictures of its own: leave --{name} out")
     make_folder(options.debug_strategies)
@@ -408,7 +412,13 @@ def _setting_values(options: argparse.Namespace) -> dict[str, Any]:
         if not equals:
             raise UsageError(f"--set {text}: must be NAME=VALUE")
         texts[name.strip()] = value
-    named = {"samples": options.samples, "time_limit": options.time, "device": options.device, "seed": options.seed}
+    named = {
+        "samples": options.samples,
+        "time_limit": options.time,
+        "noise_threshold": options.noise,
+        "device": options.device,
+        "seed": options.seed,
+    }
     texts |= {name: value for name, value in named.items() if value is not None}
     settings = RenderSettings.from_strings(texts).to_dict()
     return {name: settings[name] for name in texts}
