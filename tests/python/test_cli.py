@@ -267,6 +267,14 @@ def test_interrupting_before_the_first_picture_leaves_none(folder: Path) -> None
     assert not (folder / "a.exr").exists()
 
 
+def test_progress_tells_the_noise(folder: Path) -> None:
+    noise = ("--noise", "1e-5", "--time", "1.5")
+    terminal = OnTerminal(folder, "render", "room.vlp.npz", "-o", "a.exr", "--samples", "100000", *noise)
+    terminal.read_until(None)
+    terminal.process.communicate(timeout=20)
+    assert re.search(rb"/100000 iterations, [^\r]* noise 0\.\d+", terminal.shown)
+
+
 def test_missing_light_is_told(folder: Path) -> None:
     short = ("--set", "eye_path_length=1", "--set", "light_path_length=0")
     said = vlp_bpt(folder, "render", "room.vlp.npz", "-o", "short.png", "--samples", "2", *short).stdout
