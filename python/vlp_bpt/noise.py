@@ -79,6 +79,8 @@ class NoiseMeter:
         """The count, above `iterations`, at which `look` wants to see the picture; infinite without a threshold."""
         if self.threshold <= 0:
             return math.inf
+        if iterations < self._looked:  # some were lost with a device: the means that are kept have light of theirs
+            self._looked, self._kept, self.noise, self.expected = 0, [], None, None
         doubled = FIRST_MEAN << (iterations // FIRST_MEAN).bit_length()
         if self.expected is None or self.expected <= iterations:
             return doubled

@@ -127,6 +127,16 @@ def test_no_render_stops_before_32_iterations() -> None:
     assert run(NoiseMeter(1e-300), noisy_means(0.3), most=600)[-1] == 600
 
 
+def test_iterations_that_are_lost_are_forgotten() -> None:
+    meter = NoiseMeter(100.0)
+    assert run(meter, noisy_means(0.3)) == [8, 16, 32]
+    assert meter.next_look(20) == 32  # fewer than were looked at
+    assert (meter.noise, meter.share(20)) == (None, 0)
+    means = noisy_means(0.3, seed=2)
+    assert not meter.look(32, lambda: means(32))
+    assert meter.look(64, lambda: means(64))
+
+
 def test_without_a_threshold_nothing_is_read() -> None:
     meter = NoiseMeter(0.0)
     assert meter.next_look(5) == float("inf")
