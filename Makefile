@@ -22,6 +22,8 @@ CMAKE_DEFINES ?=
 
 TIDY_ISA := $(if $(filter x86_64 amd64,$(shell uname -m)),avx2,baseline)
 PYTEST_ARGS ?=
+# --write: what the kernels take now is what they may take
+CUDA_CHECK_ARGS ?=
 
 CXX_FILES = $(shell find native tests/native -name '*.cpp' -o -name '*.h' -o -name '*.cu' | sort)
 NATIVE := $(shell find native -type f -not -name '*.md' 2>/dev/null) pyproject.toml
@@ -64,12 +66,25 @@ test-python311: .bootstrap/.uv-$(UV_VERSION) build
 
 # Debian's libllvm19 makes Mitsuba several times faster; it works without.
 .PHONY: test-slow
-test-slow: build .venv/.peers ## the tests that take minutes each, beside Cycles and Mitsuba
+test-slow: build .venv/.peers ## the tests that take minutes each, beside Cycles, Mitsuba and LuxCore
 	$(PY) -m pytest tests --ignore=tests/blender --ignore=tests/gpu --slow -m slow $(PYTEST_ARGS)
 
 .PHONY: bench
-bench: build ## speed and error over time, beside Cycles
+bench: build ## speed and error over time beside Cycles, and a short form of the paper's experiment (half an hour)
 	.venv/bin/vlp-bpt bench
+	.venv/bin/vlp-bpt bench paper --seconds 5 --reference-seconds 6 --sweep-seconds 1 --sweep-k 3 5 --output out/bench
+
+.PHONY: bench-paper
+bench-paper: build ## the paper's experiment: out/bench-paper/report.md (half an hour)
+	.venv/bin/vlp-bpt bench paper
+
+.PHONY: bench-peers
+bench-peers: build .venv/.peers ## beside Cycles, Mitsuba and LuxCore: out/bench-peers/report.md (an hour)
+	.venv/bin/vlp-bpt bench peers
+
+.PHONY: bench-growth
+bench-growth: build ## how costs grow with triangles, lights, pixels and threads: out/bench-growth/report.md (minutes)
+	.venv/bin/vlp-bpt bench growth
 
 .PHONY: bench-rays
 bench-rays: build ## rays a second, beside Embree's where its headers are (Debian: libembree-dev), and steps a ray
@@ -134,7 +149,7 @@ cuda-check: .venv/.ready ## compile the CUDA code with the PyPI toolchain alone 
 	PATH=$(BIN):/usr/bin:/bin env -u CUDA_HOME -u CUDA_PATH -u LIBRARY_PATH bash -euo pipefail -c " \
 	  cmake -S native -B build/cuda -G Ninja -DVLP_PYTHON=OFF -DVLP_CUDA=ON -DVLP_CUDA_ROOT=$$root -DVLP_CUDA_ARCHITECTURES='75-real;90-real' -DVLP_CUDA_REPORT=ON -DVLP_WERROR=ON && \
 	  cmake --build build/cuda --target vlp_cuda -v >build/cuda/build.log 2>&1 || { cat build/cuda/build.log >&2; exit 1; }"
-	$(PY) .ci/kernel-resources.py build/cuda/build.log native/backend/kernels.md
+	$(PY) .ci/kernel-resources.py build/cuda/build.log build/cuda/libvlp_cuda.a "$$(.ci/cuda.sh)/bin/nvdisasm" native/backend/kernels.md $(CUDA_CHECK_ARGS)
 
 .PHONY: gpu-check
 gpu-check: ## build with CUDA and test, on a machine with a GPU and no package registry

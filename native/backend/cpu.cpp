@@ -5,6 +5,7 @@
 
 #include "backend/backend.h"
 #include "backend/guided_pixel.h"
+#include "core/atomic_add.h"
 #include "core/parallel.h"
 #include "integrator/light_tracing.h"
 #include "integrator/path_tracing.h"
@@ -41,9 +42,16 @@ struct Tile {
     uint32_t x, y;  // in tiles
 };
 
+uint32_t tiles_along(uint32_t pixels) { return (pixels + k_tile - 1) / k_tile; }
+
+// Of light paths, in which threads take them.
+uint32_t piece_count(const PassSettings& pass) {
+    return pass.traces_light() ? (pass.light_paths + k_paths_per_piece - 1) / k_paths_per_piece : 0;
+}
+
 // Tiles along a Z-order curve: neighbours in time are neighbours in the picture.
 std::vector<Tile> tiles_in_morton_order(Window window) {
-    const uint32_t nx = (window.width + k_tile - 1) / k_tile, ny = (window.height + k_tile - 1) / k_tile;
+    const uint32_t nx = tiles_along(window.width), ny = tiles_along(window.height);
     uint32_t side = 1;
     while (side < std::max(nx, ny)) side *= 2;
     std::vector<Tile> tiles;
@@ -55,30 +63,25 @@ std::vector<Tile> tiles_in_morton_order(Window window) {
     return tiles;
 }
 
-struct AtomicAdd {
-    uint64_t operator()(uint64_t& word, uint64_t x) const {
-        return std::atomic_ref(word).fetch_add(x, std::memory_order_relaxed);
-    }
-};
-
 class CpuBackend final : public Backend {
 public:
-    CpuBackend(const SceneView& scene, const PassSettings& pass, unsigned threads)
-        : scene_(scene), pass_(pass), pool_(threads) {
-        if (pass.kappa > 0) {
-            const size_t capacity = static_cast<size_t>(pass.light_paths) * pass.light_path_length;
-            slots_ = allocate_light_vertices(capacity);
-            stored_.resize(capacity);
+    CpuBackend(const Scene& scene, const PassSettings& pass, unsigned threads) : pool_(threads) { update(scene, pass); }
+
+    void update(const Scene& scene, const PassSettings& pass) override {
+        counters.dropped = 0;
+        scene_ = scene.view();
+        pass_ = pass;
+        const size_t capacity = pass.kappa > 0 ? light_vertex_capacity(pass) : 0;
+        if (stored_.size() != capacity) {
+            slots_ = capacity > 0 ? allocate_light_vertices(capacity) : nullptr;
+            stored_ = std::vector<uint32_t>(capacity);
         }
-        if (pass.traces_light()) {
-            const uint32_t pieces = (pass.light_paths + k_paths_per_piece - 1) / k_paths_per_piece;
-            vertices_in_piece_.resize(pieces);
-            stored_in_piece_.resize(pieces + 1);
-        }
+        vertices_in_piece_ = std::vector<uint32_t>(piece_count(pass));
+        stored_in_piece_ = std::vector<uint32_t>(piece_count(pass) + 1);
+        tiles_ = tiles_in_morton_order(scene.window());
     }
 
     bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
-        if (tiles_.empty()) tiles_ = tiles_in_morton_order(film.window());
         const auto pieces = static_cast<uint32_t>(vertices_in_piece_.size());
         counters.work_done = 0;
         counters.work_total = pieces + static_cast<uint32_t>(tiles_.size());
@@ -103,8 +106,11 @@ public:
         return true;
     }
 
-    size_t bytes() const override {
-        return stored_.capacity() * (sizeof(LightVertex) + sizeof(uint32_t)) + tiles_.capacity() * sizeof(Tile);
+    void add_memory(MemoryByDevice& memory) const override {
+        MemoryUse& cpu = memory["CPU"];
+        cpu.light_vertices += stored_.capacity() * (sizeof(LightVertex) + sizeof(uint32_t));
+        cpu.work += (vertices_in_piece_.capacity() + stored_in_piece_.capacity()) * sizeof(uint32_t) +
+                    tiles_.capacity() * sizeof(Tile);
     }
 
 private:
@@ -194,7 +200,14 @@ private:
 }  // namespace
 
 std::unique_ptr<Backend> make_cpu_backend(const Scene& scene, const PassSettings& pass, unsigned threads) {
-    return std::make_unique<CpuBackend>(scene.view(), pass, threads);
+    return std::make_unique<CpuBackend>(scene, pass, threads);
+}
+
+void add_cpu_memory(MemoryByDevice& memory, Window window, const PassSettings& pass) {
+    MemoryUse& cpu = memory["CPU"];
+    if (pass.kappa > 0) cpu.light_vertices += light_vertex_capacity(pass) * (sizeof(LightVertex) + sizeof(uint32_t));
+    cpu.work += (2 * size_t{piece_count(pass)} + 1) * sizeof(uint32_t) +
+                size_t{tiles_along(window.width)} * tiles_along(window.height) * sizeof(Tile);
 }
 
 }  // namespace vlp

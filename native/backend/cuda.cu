@@ -1,194 +1,127 @@
-// The CUDA back end: the CPU's passes, one thread a path, from kernels of a few lines.
-#include <algorithm>
+// The CUDA back end: memory, streams and launches of a GPU for GpuBackend.
 #include <cub/device/device_scan.cuh>
 
-#include "backend/backend.h"
-#include "backend/device_buffer.h"
-#include "integrator/guides.h"
-#include "integrator/light_tracing.h"
-#include "scene/scene.h"
+#include "backend/gpu_backend.h"
 
 namespace vlp {
 namespace {
 
 constexpr uint32_t k_block_size = 128;
-// Bound how long a kernel runs before `stop` is looked at.
-constexpr uint32_t k_pixels_per_launch = 1u << 18, k_paths_per_launch = 1u << 18;
 
-uint32_t blocks_for(uint32_t threads) { return (threads + k_block_size - 1) / k_block_size; }
-
-struct AtomicAdd {
-    __device__ uint64_t operator()(uint64_t& word, uint64_t x) const {
-        return atomicAdd(reinterpret_cast<unsigned long long*>(&word), static_cast<unsigned long long>(x));
-    }
-};
-
-__global__ void light_pass(SceneView scene, PassSettings pass, uint32_t iteration, Window window, uint32_t first_path,
-                           uint32_t end_path, LightVertex* slots, uint32_t* stored_in_path, ExactSum* splats,
-                           ExactSum* point_splats, unsigned long long* dropped) {
-    const uint32_t path = first_path + blockIdx.x * blockDim.x + threadIdx.x;
-    if (path >= end_path) return;
-    LightVertex* own = slots + static_cast<size_t>(path) * pass.light_path_length;
-    SplatSink<AtomicAdd> sink{pass, window, splats, point_splats, {}};
-    const LightPathCounts counts = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
-    for (uint32_t i = counts.vertices; i < pass.light_path_length; ++i) own[i].packed = 0;
-    stored_in_path[path] = counts.connectible;
-    if (sink.dropped > 0) atomicAdd(dropped, static_cast<unsigned long long>(sink.dropped));
+void check_cuda(cudaError_t error, const std::string& what) {
+    if (error == cudaSuccess) return;
+    cudaGetLastError();  // or the next launch would be blamed
+    const std::string message = "device CUDA: " + what + ": " + cudaGetErrorString(error);
+    if (error == cudaErrorMemoryAllocation) throw OutOfDeviceMemory(message);
+    throw std::runtime_error(message);
 }
 
-// Lists the slots that can be connected, in their order: `end_of_path` is the inclusive scan of stored_in_path.
-__global__ void list_stored(PassSettings pass, const LightVertex* slots, const uint32_t* end_of_path,
-                            uint32_t* stored) {
-    const uint32_t path = blockIdx.x * blockDim.x + threadIdx.x;
-    if (path >= pass.light_paths) return;
-    uint32_t next = path == 0 ? 0 : end_of_path[path - 1];
-    const uint32_t first = path * pass.light_path_length;
-    for (uint32_t slot = first; slot < first + pass.light_path_length; ++slot) {
-        if (slots[slot].connectible()) stored[next++] = slot;
-    }
+// Two blocks a processor let every pass keep what it works on in registers.
+template <typename Body>
+__global__ void __launch_bounds__(k_block_size, 2)
+    run(const __grid_constant__ Body body, uint32_t begin, uint32_t end) {
+    const uint32_t i = begin + blockIdx.x * blockDim.x + threadIdx.x;
+    if (i < end) body(i);
 }
 
-// `found` is the part of the sink that sums up the pixel.
-template <typename Sink>
-__device__ void trace_pixel(const SceneView& scene, const PassSettings& pass, const LightVertexCache& cache,
-                            uint32_t iteration, Window window, uint32_t pixel, Sink& sink, const PixelSink& found,
-                            PixelSample* frame, unsigned long long* dropped) {
-    const uint32_t x = window.x + pixel % window.width, y = window.y + pixel / window.width;
-    const float alpha = trace_eye_path(scene, pass, cache, iteration, x, y, sink);
-    if (found.dropped > 0) atomicAdd(dropped, static_cast<unsigned long long>(found.dropped));
-    frame[pixel] = {{found.radiance.r, found.radiance.g, found.radiance.b, alpha}};
+// Of one kernel: the driver keeps stacks for all threads that the GPU has room for.
+template <typename Body>
+size_t stack_bytes_of() {
+    cudaFuncAttributes kernel;
+    int device = 0, processors = 0, threads = 0;
+    check_cuda(cudaFuncGetAttributes(&kernel, run<Body>), "asking about a kernel");
+    check_cuda(cudaGetDevice(&device), "asking for the GPU");
+    check_cuda(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device), "asking about the GPU");
+    check_cuda(cudaDeviceGetAttribute(&threads, cudaDevAttrMaxThreadsPerMultiProcessor, device),
+               "asking about the GPU");
+    return kernel.localSizeBytes * static_cast<size_t>(processors) * static_cast<size_t>(threads);
 }
 
-__global__ void eye_pass(SceneView scene, PassSettings pass, LightVertexCache cache, uint32_t iteration, Window window,
-                         uint32_t first_pixel, uint32_t end_pixel, PixelSample* frame, unsigned long long* dropped) {
-    const uint32_t pixel = first_pixel + blockIdx.x * blockDim.x + threadIdx.x;
-    if (pixel >= end_pixel) return;
-    PixelSink sink{pass};
-    trace_pixel(scene, pass, cache, iteration, window, pixel, sink, sink, frame, dropped);
+size_t most_stack_bytes() {
+    return std::max({stack_bytes_of<LightPass>(), stack_bytes_of<EyePass>(), stack_bytes_of<GuidedEyePass>()});
 }
 
-// A kernel of its own: without guides the eye pass has no code for them.
-__global__ void guided_eye_pass(SceneView scene, PassSettings pass, LightVertexCache cache, uint32_t iteration,
-                                Window window, uint32_t first_pixel, uint32_t end_pixel, PixelSample* frame,
-                                unsigned long long* dropped, GuideSample* guides) {
-    const uint32_t pixel = first_pixel + blockIdx.x * blockDim.x + threadIdx.x;
-    if (pixel >= end_pixel) return;
-    GuidedSink sink(pass, scene);
-    trace_pixel(scene, pass, cache, iteration, window, pixel, sink, sink.pixel, frame, dropped);
-    guides[pixel] = sink.guide();
-}
-
-class CudaBackend final : public Backend {
+class CudaDevice {
 public:
-    CudaBackend(const Scene& scene, const PassSettings& pass) : pass_(pass) {
-        scene_ = scene.view_placed([this](const void* data, size_t bytes) -> const void* {
-            DeviceBuffer<std::byte> buffer(bytes, "the scene");
-            check_cuda(cudaMemcpy(buffer.data(), data, bytes, cudaMemcpyHostToDevice), "uploading the scene");
-            bytes_ += bytes;
-            scene_buffers_.push_back(std::move(buffer));
-            return scene_buffers_.back().data();
-        });
-        dropped_ = DeviceBuffer<unsigned long long>(1, "a counter");
-        frame_ = DeviceBuffer<PixelSample>(scene.window().pixel_count(), "the film");
-        if (pass_.splats) splats_ = DeviceBuffer<ExactSum>(scene.window().pixel_count() * 3, "splats");
-        if (pass_.splats && pass_.guides)
-            point_splats_ = DeviceBuffer<ExactSum>(scene.window().pixel_count() * 3, "splats");
-        if (pass_.guides) guides_ = DeviceBuffer<GuideSample>(scene.window().pixel_count(), "a denoiser's guides");
-        bytes_ += frame_.bytes() + splats_.bytes() + point_splats_.bytes() + guides_.bytes();
-        if (pass_.traces_light()) {
-            const size_t capacity = static_cast<size_t>(pass_.light_paths) * pass_.light_path_length;
-            slots_ = DeviceBuffer<LightVertex>(capacity, "light vertices");
-            stored_ = DeviceBuffer<uint32_t>(capacity, "the list of virtual light points");
-            end_of_path_ = DeviceBuffer<uint32_t>(pass_.light_paths, "counts of virtual light points");
-            size_t scratch = 0;
-            cub::DeviceScan::InclusiveSum(nullptr, scratch, end_of_path_.data(), end_of_path_.data(),
-                                          static_cast<int>(pass_.light_paths));
-            scratch_ = DeviceBuffer<std::byte>(scratch, "a scan");
-            bytes_ += slots_.bytes() + stored_.bytes() + end_of_path_.bytes() + scratch_.bytes();
+    static constexpr const char* k_name = "CUDA";
+
+    class Event {
+    public:
+        explicit Event(CudaDevice&) {
+            // Waiting leaves the processor to others, such as the CPU back end of HYBRID.
+            check_cuda(cudaEventCreateWithFlags(&event, cudaEventBlockingSync | cudaEventDisableTiming),
+                       "making an event");
         }
+        Event(const Event&) = delete;
+        Event& operator=(const Event&) = delete;
+        ~Event() { cudaEventDestroy(event); }
+
+        cudaEvent_t event = nullptr;
+    };
+
+    CudaDevice() {
+        check_cuda(cudaStreamCreateWithFlags(&passes_, cudaStreamNonBlocking), "making a stream");
+        check_cuda(cudaStreamCreateWithFlags(&copies_, cudaStreamNonBlocking), "making a stream");
+    }
+    CudaDevice(const CudaDevice&) = delete;
+    CudaDevice& operator=(const CudaDevice&) = delete;
+    ~CudaDevice() {
+        cudaStreamDestroy(passes_);
+        cudaStreamDestroy(copies_);
     }
 
-    bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
-        const Window window = film.window();
-        const uint32_t pixels = static_cast<uint32_t>(window.pixel_count());
-        counters.work_done = 0;
-        counters.work_total = pixels;
-        check_cuda(cudaMemset(dropped_.data(), 0, dropped_.bytes()), "clearing a counter");
-        const LightVertexCache cache = run_light_pass(iteration, window, stop);
-        for (uint32_t first = 0; first < pixels; first += k_pixels_per_launch) {
-            if (stop) return false;
-            const uint32_t end = std::min(pixels, first + k_pixels_per_launch);
-            if (pass_.guides) {
-                guided_eye_pass<<<blocks_for(end - first), k_block_size>>>(scene_, pass_, cache, iteration, window,
-                                                                           first, end, frame_.data(), dropped_.data(),
-                                                                           guides_.data());
-            } else {
-                eye_pass<<<blocks_for(end - first), k_block_size>>>(scene_, pass_, cache, iteration, window, first, end,
-                                                                    frame_.data(), dropped_.data());
-            }
-            check_cuda(cudaGetLastError(), "starting the eye pass");
-            check_cuda(cudaDeviceSynchronize(), "the eye pass");
-            counters.work_done = end;
+    void* allocate(size_t bytes, bool on_host) {
+        void* data = nullptr;
+        const cudaError_t error = on_host ? cudaMallocHost(&data, bytes) : cudaMalloc(&data, bytes);
+        if (error != cudaErrorMemoryAllocation) check_cuda(error, "allocating " + std::to_string(bytes) + " bytes");
+        cudaGetLastError();
+        return data;
+    }
+    void release(void* data, bool on_host) { on_host ? cudaFreeHost(data) : cudaFree(data); }
+
+    // In the passes' stream, so that they come after it; `from` is read before it returns.
+    void upload(void* to, const void* from, size_t bytes) {
+        check_cuda(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, passes_), "uploading the scene");
+    }
+    void clear(void* to, size_t bytes) {
+        if (bytes > 0) check_cuda(cudaMemsetAsync(to, 0, bytes, passes_), "clearing memory");
+    }
+    void download(Queue in, void* to, const void* from, size_t bytes) {
+        check_cuda(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, stream(in)), "reading from the GPU");
+    }
+    template <typename Body>
+    void launch(uint32_t begin, uint32_t end, const Body& body) {
+        const uint32_t blocks = std::max(1u, (end - begin + k_block_size - 1) / k_block_size);
+        run<<<blocks, k_block_size, 0, passes_>>>(body, begin, end);
+        const cudaError_t error = cudaGetLastError();
+        if (error == cudaErrorMemoryAllocation) {
+            check_cuda(error, "allocating " + std::to_string(stack_bytes()) + " bytes for the stacks of the passes");
         }
-        if (stop) return false;
-        unsigned long long dropped = 0;
-        check_cuda(cudaMemcpy(&dropped, dropped_.data(), sizeof dropped, cudaMemcpyDeviceToHost), "reading a counter");
-        check_cuda(cudaMemcpy(film.frame().data(), frame_.data(), frame_.bytes(), cudaMemcpyDeviceToHost),
-                   "reading the film");
-        check_cuda(cudaMemcpy(film.guide_frame().data(), guides_.data(), guides_.bytes(), cudaMemcpyDeviceToHost),
-                   "reading a denoiser's guides");
-        check_cuda(cudaMemcpy(film.splats().data(), splats_.data(), splats_.bytes(), cudaMemcpyDeviceToHost),
-                   "reading the splats");
-        check_cuda(
-            cudaMemcpy(film.point_splats().data(), point_splats_.data(), point_splats_.bytes(), cudaMemcpyDeviceToHost),
-            "reading the splats");
-        counters.dropped.fetch_add(dropped, std::memory_order_relaxed);
-        film.commit_rows(0, window.height);
-        film.count_iteration();
-        return true;
+        check_cuda(error, "starting a pass");
+    }
+    void scan(uint32_t* counts, uint32_t n, void* scratch, size_t scratch_bytes) {
+        size_t needed = 0;
+        cub::DeviceScan::InclusiveSum(nullptr, needed, counts, counts, static_cast<int>(n), passes_);
+        if (needed > scratch_bytes) throw std::runtime_error("device CUDA: a scan needs more memory than foreseen");
+        check_cuda(cub::DeviceScan::InclusiveSum(scratch, scratch_bytes, counts, counts, static_cast<int>(n), passes_),
+                   "counting virtual light points");
     }
 
-    size_t bytes() const override { return bytes_; }
+    void record(Event& event, Queue in) { check_cuda(cudaEventRecord(event.event, stream(in)), "the passes"); }
+    void queue_wait(Queue in, Event& event) { check_cuda(cudaStreamWaitEvent(stream(in), event.event), "the passes"); }
+    void wait(Event& event) { check_cuda(cudaEventSynchronize(event.event), "the passes"); }
+    bool is_over(Event& event) {
+        const cudaError_t state = cudaEventQuery(event.event);
+        if (state != cudaErrorNotReady) check_cuda(state, "the passes");
+        return state == cudaSuccess;
+    }
+
+    size_t stack_bytes() const { return most_stack_bytes(); }
 
 private:
-    LightVertexCache run_light_pass(uint32_t iteration, Window window, const std::atomic<bool>& stop) {
-        if (slots_.size() == 0) return {};
-        const uint32_t paths = pass_.light_paths;
-        check_cuda(cudaMemset(splats_.data(), 0, splats_.bytes()), "clearing the splats");
-        check_cuda(cudaMemset(point_splats_.data(), 0, point_splats_.bytes()), "clearing the splats");
-        for (uint32_t first = 0; first < paths; first += k_paths_per_launch) {
-            if (stop) return {};
-            const uint32_t end = std::min(paths, first + k_paths_per_launch);
-            light_pass<<<blocks_for(end - first), k_block_size>>>(scene_, pass_, iteration, window, first, end,
-                                                                  slots_.data(), end_of_path_.data(), splats_.data(),
-                                                                  point_splats_.data(), dropped_.data());
-            check_cuda(cudaGetLastError(), "starting the light pass");
-            check_cuda(cudaDeviceSynchronize(), "the light pass");
-        }
-        if (!(pass_.kappa > 0)) return {};
-        size_t scratch = scratch_.bytes();
-        check_cuda(cub::DeviceScan::InclusiveSum(scratch_.data(), scratch, end_of_path_.data(), end_of_path_.data(),
-                                                 static_cast<int>(paths)),
-                   "counting virtual light points");
-        list_stored<<<blocks_for(paths), k_block_size>>>(pass_, slots_.data(), end_of_path_.data(), stored_.data());
-        uint32_t count = 0;
-        check_cuda(cudaMemcpy(&count, end_of_path_.data() + paths - 1, sizeof count, cudaMemcpyDeviceToHost),
-                   "the light pass");
-        counters.stored_vlps = count;
-        return {slots_.data(), stored_.data(), count};
-    }
+    cudaStream_t stream(Queue in) const { return in == Queue::passes ? passes_ : copies_; }
 
-    PassSettings pass_;
-    SceneView scene_;
-    std::vector<DeviceBuffer<std::byte>> scene_buffers_;
-    DeviceBuffer<LightVertex> slots_;
-    DeviceBuffer<uint32_t> stored_, end_of_path_;
-    DeviceBuffer<std::byte> scratch_;
-    DeviceBuffer<PixelSample> frame_;
-    DeviceBuffer<GuideSample> guides_;
-    DeviceBuffer<ExactSum> splats_, point_splats_;
-    DeviceBuffer<unsigned long long> dropped_;
-    size_t bytes_ = 0;
+    cudaStream_t passes_ = nullptr, copies_ = nullptr;
 };
 
 }  // namespace
@@ -197,9 +130,7 @@ std::unique_ptr<Backend> make_cuda_backend(const Scene& scene, const PassSetting
     int count = 0;
     check_cuda(cudaGetDeviceCount(&count), "no usable GPU");
     if (count == 0) throw std::runtime_error("device CUDA: there is no GPU");
-    // Waiting leaves the processor to others, such as the CPU back end of HYBRID.
-    check_cuda(cudaSetDeviceFlags(cudaDeviceScheduleBlockingSync), "choosing how to wait");
-    return std::make_unique<CudaBackend>(scene, pass);
+    return std::make_unique<GpuBackend<CudaDevice>>(scene, pass);
 }
 
 std::vector<DeviceInfo> cuda_devices() {
@@ -213,5 +144,7 @@ std::vector<DeviceInfo> cuda_devices() {
     }
     return devices;
 }
+
+size_t cuda_stack_bytes() { return cuda_devices().empty() ? 0 : most_stack_bytes(); }
 
 }  // namespace vlp

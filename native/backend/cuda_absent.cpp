@@ -10,5 +10,6 @@ std::unique_ptr<Backend> make_cuda_backend(const Scene&, const PassSettings&) {
 }
 
 std::vector<DeviceInfo> cuda_devices() { return {}; }
+size_t cuda_stack_bytes() { return 0; }
 
 }  // namespace vlp

@@ -1,7 +1,5 @@
-// Memory on a GPU that says what it was for when it cannot be had.
+// Memory on a device that says what it was for when it cannot be had.
 #pragma once
-
-#include <cuda_runtime.h>
 
 #include <atomic>
 #include <cstdlib>
@@ -11,11 +9,9 @@
 
 namespace vlp {
 
-inline void check_cuda(cudaError_t error, const std::string& what) {
-    if (error != cudaSuccess) {
-        throw std::runtime_error("device CUDA: " + what + ": " + cudaGetErrorString(error));
-    }
-}
+struct OutOfDeviceMemory : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
 
 // Bytes that all buffers may take together: the environment variable VLP_BPT_GPU_MEMORY, for those who share a GPU and
 // for tests; else as many as there are.
@@ -29,28 +25,35 @@ inline std::atomic<size_t>& device_memory_taken() {
     return taken;
 }
 
-template <typename T>
+// `count` numbers of the device's memory; `on_host`: of the machine's own, where the device can copy to while it computes. The
+// device must outlive them.
+template <typename T, typename Device>
 class DeviceBuffer {
 public:
     DeviceBuffer() = default;
-    DeviceBuffer(size_t count, const std::string& what) : count_(count) {
+    DeviceBuffer(Device& device, size_t count, const std::string& what, bool on_host = false)
+        : device_(&device), count_(count), on_host_(on_host) {
         if (count == 0) return;
-        const bool fits = device_memory_taken() + bytes() <= device_memory_limit();
-        check_cuda(fits ? cudaMalloc(&data_, bytes()) : cudaErrorMemoryAllocation,
-                   "allocating " + std::to_string(bytes()) + " bytes for " + what);
-        device_memory_taken() += bytes();
+        const bool fits = on_host || bytes() <= device_memory_limit() - device_memory_taken();
+        if (fits) data_ = static_cast<T*>(device.allocate(bytes(), on_host));
+        if (data_ == nullptr) {
+            throw OutOfDeviceMemory(std::string("device ") + Device::k_name + ": allocating " +
+                                    std::to_string(bytes()) + " bytes for " + what + ": out of memory");
+        }
+        if (!on_host) device_memory_taken() += bytes();
     }
-    DeviceBuffer(DeviceBuffer&& other) noexcept
-        : data_(std::exchange(other.data_, nullptr)), count_(std::exchange(other.count_, 0)) {}
+    DeviceBuffer(DeviceBuffer&& other) noexcept { *this = std::move(other); }
     DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {
+        std::swap(device_, other.device_);
         std::swap(data_, other.data_);
         std::swap(count_, other.count_);
+        std::swap(on_host_, other.on_host_);
         return *this;
     }
     ~DeviceBuffer() {
         if (data_ == nullptr) return;
-        cudaFree(data_);
-        device_memory_taken() -= bytes();
+        device_->release(data_, on_host_);
+        if (!on_host_) device_memory_taken() -= bytes();
     }
 
     T* data() const { return data_; }
@@ -58,8 +61,10 @@ public:
     size_t bytes() const { return count_ * sizeof(T); }
 
 private:
+    Device* device_ = nullptr;
     T* data_ = nullptr;
     size_t count_ = 0;
+    bool on_host_ = false;
 };
 
 }  // namespace vlp

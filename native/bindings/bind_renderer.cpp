@@ -75,7 +75,8 @@ PassSettings pass_of(const nb::dict& settings, bool transparent_film) {
     return pass;
 }
 
-nb::object film_state(const Renderer& renderer) {
+nb::object film_state(Renderer& renderer) {
+    renderer.settle();
     const auto sums = renderer.film().sums();
     const Window& window = renderer.film().window();
     auto* words = new int64_t[sums.size() * 2];
@@ -101,7 +102,7 @@ void add_film_state(Renderer& renderer, FilmState state, uint64_t iterations) {
         throw std::invalid_argument("film state of " + std::to_string(state.shape(2)) + " channels, but the film has " +
                                     std::to_string(renderer.film().channels()));
     }
-    renderer.film().add({reinterpret_cast<const ExactSum*>(state.data()), state.size() / 2}, iterations);
+    renderer.add_film_state({reinterpret_cast<const ExactSum*>(state.data()), state.size() / 2}, iterations);
 }
 
 PassSettings pass_of(const std::shared_ptr<Scene>& scene, const nb::dict& settings) {
@@ -114,15 +115,32 @@ uint32_t traced_light_paths(const Renderer& renderer) {
     return renderer.pass().traces_light() ? renderer.pass().light_paths : 0;
 }
 
-nb::dict memory_of(const Renderer& renderer, const Scene& scene) {
-    nb::dict d;
-    d["geometry"] = scene.info().geometry_bytes;
-    d["bvh"] = scene.info().bvh_bytes;
-    d["lights"] = scene.info().light_bytes;
-    d["materials"] = scene.info().material_bytes;
-    d["film"] = renderer.film().bytes();
-    d["virtual_light_points"] = renderer.backend_bytes();
-    return d;
+// {device: {part: bytes}} without what takes none.
+nb::dict to_python(const MemoryByDevice& memory) {
+    nb::dict devices;
+    for (const auto& [device, use] : memory) {
+        nb::dict parts;
+        const auto put = [&](const char* name, size_t bytes) {
+            if (bytes > 0) parts[name] = bytes;
+        };
+        for (size_t i = 0; i < use.scene.of.size(); ++i) put(k_scene_part_names[i], use.scene.of[i]);
+        put("light_vertices", use.light_vertices);
+        put("film", use.film);
+        put("work", use.work);
+        put("stacks", use.stacks);
+        devices[device.c_str()] = parts;
+    }
+    return devices;
+}
+
+// The iterations that settings ask for: where they end, and that they begin with.
+struct IterationRange {
+    uint32_t first, end;
+};
+
+IterationRange range_of(const nb::dict& settings) {
+    const auto samples = get<uint32_t>(settings, "samples"), first = get<uint32_t>(settings, "iteration_begin");
+    return {first, samples < k_none - first ? first + samples : k_none};
 }
 
 nb::list devices() {
@@ -148,34 +166,43 @@ void bind_renderer(nb::module_& m) {
              [](Renderer* self, std::shared_ptr<Scene> scene, const nb::dict& settings) {
                  const PassSettings asked = pass_of(scene, settings);
                  const auto device = get<std::string>(settings, "device");
-                 const auto threads = get<uint32_t>(settings, "threads"), samples = get<uint32_t>(settings, "samples"),
-                            first = get<uint32_t>(settings, "iteration_begin");
+                 const auto threads = get<uint32_t>(settings, "threads");
+                 const IterationRange iterations = range_of(settings);
                  nb::gil_scoped_release release;
-                 const PassSettings pass = for_scene(scene->view(), asked);
-                 const uint32_t end = samples < k_none - first ? first + samples : k_none;
-                 new (self)
-                     Renderer(scene, pass, scene->window(), make_devices(device, *scene, pass, threads), first, end);
+                 PassSettings pass = for_scene(scene->view(), asked);
+                 Devices made = make_devices(device, *scene, pass, threads);
+                 new (self) Renderer(scene, pass, scene->window(), std::move(made), iterations.first, iterations.end);
+             })
+        .def("update",
+             [](Renderer& r, std::shared_ptr<Scene> scene, const nb::dict& settings) {
+                 const PassSettings asked = pass_of(scene, settings);
+                 const IterationRange iterations = range_of(settings);
+                 nb::gil_scoped_release release;
+                 r.update(scene, for_scene(scene->view(), asked), iterations.first, iterations.end);
              })
         .def("iterate", &Renderer::iterate, nb::arg("count"), nb::call_guard<nb::gil_scoped_release>())
         .def("cancel", &Renderer::cancel)
         .def(
             "rest", [](Renderer& r) { r.rest(); }, nb::call_guard<nb::gil_scoped_release>())
+        .def("settle", &Renderer::settle, nb::call_guard<nb::gil_scoped_release>())
         .def("set_deadline", &Renderer::set_deadline, nb::arg("seconds"))
         .def("progress", &Renderer::progress)
         .def(
             "read",
-            [](const Renderer& r, Picture out) {
+            [](Renderer& r, Picture out) {
                 require_size_of_film(r, out, "picture");
                 const std::span<float> rgba(out.data(), out.size());
                 nb::gil_scoped_release release;
+                r.settle();
                 r.film().read(rgba);
             },
             nb::arg("out").noconvert())
         .def(
             "read_guided",
-            [](const Renderer& r, RgbPicture color, RgbPicture albedo, RgbPicture normal) {
+            [](Renderer& r, RgbPicture color, RgbPicture albedo, RgbPicture normal) {
                 for (const RgbPicture& picture : {color, albedo, normal}) require_size_of_film(r, picture, "picture");
                 nb::gil_scoped_release release;
+                r.settle();
                 r.film().read_guided({color.data(), color.size()}, {albedo.data(), albedo.size()},
                                      {normal.data(), normal.size()});
             },
@@ -191,14 +218,15 @@ void bind_renderer(nb::module_& m) {
                 return std::array<float, 2>{lost.share, lost.standard_error};
             },
             nb::arg("threads"))
-        .def("memory", [](const Renderer& r) { return memory_of(r, r.scene()); })
-        .def_prop_ro("iterations", [](const Renderer& r) { return r.film().iterations(); })
+        .def("memory", [](const Renderer& r) { return to_python(r.memory()); })
+        .def_prop_ro("uploaded_bytes", &Renderer::uploaded_bytes)
+        .def_prop_ro("iterations", &Renderer::iteration_count)
         .def_prop_ro("vlps", [](const Renderer& r) { return r.stored_vlps(); })
         .def_prop_ro("dropped", [](const Renderer& r) { return r.dropped(); })
         .def_prop_ro("light_paths", &traced_light_paths)
         .def_prop_ro("paths",
                      [](const Renderer& r) {
-                         return r.film().iterations() * (r.film().window().pixel_count() + traced_light_paths(r));
+                         return r.iteration_count() * (r.film().window().pixel_count() + traced_light_paths(r));
                      })
         .def_prop_ro("ranges", [](const Renderer& r) { return r.iterations().finished(); })
         .def_prop_ro("notes", &Renderer::notes)
@@ -219,6 +247,16 @@ void bind_renderer(nb::module_& m) {
             },
             nb::arg("s"), nb::arg("t"), nb::arg("weighted"), nb::arg("out").noconvert());
     m.def("devices", &devices);
+    m.def("plan_memory", [](const std::shared_ptr<Scene>& scene, const nb::dict& settings) {
+        const PassSettings asked = pass_of(scene, settings);
+        const auto device = get<std::string>(settings, "device");
+        MemoryByDevice plan;
+        {
+            nb::gil_scoped_release release;
+            plan = plan_memory(device, *scene, for_scene(scene->view(), asked));
+        }
+        return to_python(plan);
+    });
 }
 
 }  // namespace vlp

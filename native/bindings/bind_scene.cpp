@@ -116,10 +116,8 @@ nb::ndarray<nb::numpy, uint8_t, nb::ndim<1>> occluded_rays(const Scene& scene, T
 nb::dict info_of(const Scene& scene) {
     const Scene::Info& info = scene.info();
     nb::dict bytes, d;
-    bytes["geometry"] = info.geometry_bytes;
-    bytes["bvh"] = info.bvh_bytes;
-    bytes["lights"] = info.light_bytes;
-    bytes["materials"] = info.material_bytes;
+    const ByPart<size_t> parts = scene.bytes();
+    for (size_t i = 0; i < parts.of.size(); ++i) bytes[k_scene_part_names[i]] = parts.of[i];
     d["triangles"] = info.triangles;
     d["spheres"] = info.spheres;
     d["instances"] = info.instances;
@@ -225,6 +223,9 @@ void bind_scene(nb::module_& m) {
              [](Scene& s, uint32_t width, uint32_t height, uint32_t x, uint32_t y, uint32_t window_width,
                 uint32_t window_height,
                 bool transparent) { s.set_film(width, height, {x, y, window_width, window_height}, transparent); })
+        .def(
+            "reopen", [](Scene& s, bool materials, bool lamps, bool world) { s.reopen({materials, lamps, world}); },
+            nb::arg("materials"), nb::arg("lamps"), nb::arg("world"))
         .def("build", &Scene::build, nb::arg("threads") = 0, nb::call_guard<nb::gil_scoped_release>())
         .def("intersect", &intersect_rays, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))
         .def("occluded", &occluded_rays, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))

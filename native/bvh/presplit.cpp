@@ -78,10 +78,10 @@ void cut(const Corners& triangle, const Box& box, const Plane& plane, Box (&part
     for (Box& p : part) p = intersection(p, box);
 }
 
-// What a triangle's box has beyond that of a right triangle in a plane of two axes, which no cut improves much.
+// What a triangle's box has beyond four times its projections, which most triangles of fine meshes keep to.
 float waste_of(const Corners& c, const Box& box) {
     const Vec3 n = cross(c.v[1] - c.v[0], c.v[2] - c.v[0]);  // twice the areas of its projections
-    return box.half_area() - (std::fabs(n.x) + std::fabs(n.y) + std::fabs(n.z));
+    return box.half_area() - 2 * (std::fabs(n.x) + std::fabs(n.y) + std::fabs(n.z));
 }
 
 class Splitter {

@@ -40,10 +40,10 @@ VLP_HD VLP_FORCE_INLINE void prefetch([[maybe_unused]] const BvhView& bvh, [[may
 #if !VLP_ON_DEVICE
     // Without a branch, which would be mispredicted; spheres and instances are few and not worth it.
     const uint64_t at_leaf = child_kind(child) == ChildKind::node ? 0 : ~uint64_t{0};
-    const auto nodes = reinterpret_cast<uint64_t>(bvh.nodes), blocks = reinterpret_cast<uint64_t>(bvh.triangle_blocks);
-    const uint64_t base = nodes ^ ((nodes ^ blocks) & at_leaf);
+    const auto* const nodes = reinterpret_cast<const char*>(bvh.nodes);
+    const uint64_t to_blocks = reinterpret_cast<uint64_t>(bvh.triangle_blocks) - reinterpret_cast<uint64_t>(nodes);
     const uint64_t size = sizeof(BvhNode) ^ ((sizeof(BvhNode) ^ sizeof(TriangleBlock)) & at_leaf);
-    const auto* const first = reinterpret_cast<const char*>(base + child_index(child) * size);
+    const char* const first = nodes + ((to_blocks & at_leaf) + child_index(child) * size);
     __builtin_prefetch(first);
     __builtin_prefetch(first + 64);
     __builtin_prefetch(first + 128);

@@ -4,7 +4,7 @@ if(VLP_CUDA STREQUAL "OFF")
   return()
 endif()
 set(VLP_CUDA_ROOT "" CACHE PATH "CUDA toolkit to use; empty: CUDA_HOME, PATH, then the PyPI packages nvidia-cuda-* beside Python")
-option(VLP_CUDA_REPORT "Let ptxas say what each kernel takes" OFF)
+option(VLP_CUDA_REPORT "Let ptxas say what each kernel takes, and leave its code uncompressed for nvdisasm" OFF)
 set(VLP_CUDA_LIBRARY "" CACHE FILEPATH "A libvlp_cuda.a to use instead of compiling: a release compiles it once for several Pythons")
 
 # The CUDA runtime is linked statically. (FindCUDAToolkit is of no use: it wants libcudart.so, which the PyPI packages lack.)
@@ -53,7 +53,7 @@ file(GLOB cuda_sources CONFIGURE_DEPENDS backend/*.cu)
 add_library(vlp_cuda STATIC ${cuda_sources})
 target_compile_options(vlp_cuda PRIVATE --expt-relaxed-constexpr --extended-lambda -lineinfo --threads=0
   -Xcompiler=-fno-math-errno,-Wall $<$<BOOL:${VLP_WERROR}>:-Werror=all-warnings>
-  $<$<BOOL:${VLP_CUDA_REPORT}>:-Xptxas=-v>)
+  $<$<BOOL:${VLP_CUDA_REPORT}>:-Xptxas=-v$<SEMICOLON>--no-compress>)
 target_link_libraries(vlp_cuda PUBLIC vlp_options)
 vlp_link_cuda_runtime(${CMAKE_CUDA_COMPILER_TOOLKIT_ROOT})
 set(VLP_HAS_CUDA TRUE)

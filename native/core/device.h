@@ -18,3 +18,11 @@
 #else
 #define VLP_FORCE_INLINE inline __attribute__((always_inline))
 #endif
+
+// A function that device code calls where the host's may have copies of it in place: its stack is taken while it runs, and
+// the instruction caches hold one of it.
+#if VLP_ON_DEVICE
+#define VLP_CALLED_ON_DEVICE __noinline__
+#else
+#define VLP_CALLED_ON_DEVICE
+#endif

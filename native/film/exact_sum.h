@@ -15,7 +15,7 @@ struct ExactSum {
     int64_t whole = 0;
 
     // Neither may be negative.
-    void add(const ExactSum& other) {
+    VLP_HD void add(const ExactSum& other) {
         constexpr int64_t k_most = INT64_MAX;
         fraction += other.fraction;
         const int64_t carry = fraction < other.fraction ? 1 : 0;
@@ -25,7 +25,7 @@ struct ExactSum {
             whole += other.whole + carry;
         }
     }
-    void add(float value);
+    VLP_HD void add(float value);
     double value() const { return static_cast<double>(whole) + static_cast<double>(fraction) * 0x1p-64; }
 };
 
@@ -36,7 +36,7 @@ VLP_HD inline ExactSum exact(float value, float most = 0x1p62f) {
     return {static_cast<uint64_t>((static_cast<double>(value) - whole) * 0x1p64), static_cast<int64_t>(whole)};
 }
 
-inline void ExactSum::add(float value) { add(exact(value)); }
+VLP_HD inline void ExactSum::add(float value) { add(exact(value)); }
 
 // Adds to a sum that others add to at the same time. `fetch_add(uint64_t& word, uint64_t x)` is atomic and gives the word as
 // it was: whoever makes the fraction wrap sees it, and no one else, so every carry is counted once, whatever the order.

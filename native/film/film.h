@@ -18,6 +18,8 @@ struct PixelSample {
 
 class Film {
 public:
+    static constexpr size_t k_guided_channels = 13;
+
     // `splats`: light paths splat on it. `guides`: it keeps those of a denoiser.
     explicit Film(Window window, bool splats = false, bool guides = false)
         : window_(window),
@@ -62,8 +64,6 @@ public:
     }
 
 private:
-    static constexpr size_t k_guided_channels = 13;
-
     Window window_;
     uint64_t iterations_ = 0;
     std::vector<PixelSample> frame_;

@@ -42,6 +42,15 @@ VLP_HD inline Vec3 perpendicular(Vec3 a, Vec3 b, Vec3 fallback) {
     return normalize_or(cross(normalize_or(a, {}), normalize_or(b, {})), fallback);
 }
 
+// What the corners of a triangle have, weighed by w, u and v: vertex attributes or ones of corners.
+template <typename Value>
+VLP_HD inline auto at_corners(const Triangle& triangle, uint32_t primitive, bool by_vertex, float w, float u, float v,
+                              const Value& value) {
+    const size_t first = 3 * static_cast<size_t>(primitive);
+    const auto at = [&](uint32_t corner) { return value(by_vertex ? triangle.v[corner] : first + corner); };
+    return at(0) * w + at(1) * u + at(2) * v;
+}
+
 VLP_HD inline void set_triangle(const GeometryView& geometry, const InstanceView& instance, float u, float v,
                                 Vec3 fallback_normal, SurfacePoint& point) {
     const Triangle& triangle = geometry.triangles[point.primitive];
@@ -55,16 +64,16 @@ VLP_HD inline void set_triangle(const GeometryView& geometry, const InstanceView
     point.geometric_normal = instance.mirrored ? -front : front;
     point.shading_normal = point.geometric_normal;
     if (geometry.corner_normals) {
-        const OctNormal* const normals = geometry.corner_normals + 3 * static_cast<size_t>(point.primitive);
-        const Vec3 n = decode(normals[0]) * w + decode(normals[1]) * u + decode(normals[2]) * v;
+        const Vec3 n = at_corners(triangle, point.primitive, geometry.normals_by_vertex, w, u, v,
+                                  [&](size_t i) { return decode(geometry.corner_normals[i]); });
         const Vec3 shading = normalize_or(transform_normal(instance.world_to_object, n), point.geometric_normal);
         // Mirrored at the tangent plane when it is under it, which leaves a normal in the plane where it is.
         const float height = dot(shading, point.geometric_normal);
         point.shading_normal = height < 0 ? shading - point.geometric_normal * (2 * height) : shading;
     }
     if (geometry.uvs) {
-        const Vec2* const uvs = geometry.uvs + 3 * static_cast<size_t>(point.primitive);
-        point.uv = uvs[0] * w + uvs[1] * u + uvs[2] * v;
+        point.uv = at_corners(triangle, point.primitive, geometry.uvs_by_vertex, w, u, v,
+                              [&](size_t i) { return geometry.uvs[i]; });
     }
 }
 

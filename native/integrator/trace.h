@@ -11,6 +11,15 @@ namespace vlp {
 // Most transparent surfaces that one edge may cross; what lies behind more of them is dark.
 inline constexpr int k_max_transparent = 128;
 
+// The searches of the tree, of which every place that sends a ray shares one stack on a device.
+VLP_HD VLP_CALLED_ON_DEVICE inline Hit find_closest(const SceneView& scene, const Ray& ray, PrimitiveId skip) {
+    return closest_hit(scene, ray, skip);
+}
+VLP_HD VLP_CALLED_ON_DEVICE inline bool find_any(const SceneView& scene, const Ray& ray, PrimitiveId from,
+                                                 PrimitiveId to) {
+    return any_hit(scene, ray, from, to);
+}
+
 // The start of a ray or one end of a connection: a point of a surface, or free in space (id none, normal zero).
 struct Anchor {
     Vec3 position;
@@ -51,7 +60,7 @@ VLP_HD VLP_FORCE_INLINE Step walk(const SceneView& scene, Ray ray, PrimitiveId s
     const float t_end = ray.t_max;
     float travelled = 0;
     for (int i = 0; i < k_max_transparent; ++i) {
-        const Hit hit = closest_hit(scene, ray, skip);
+        const Hit hit = find_closest(scene, ray, skip);
         Ray stretch = ray;
         if (hit.found()) stretch.t_max = hit.t;
         lights.on_stretch(stretch, step.throughput);
@@ -82,11 +91,11 @@ VLP_HD VLP_FORCE_INLINE Step walk(const SceneView& scene, Ray ray, PrimitiveId s
 VLP_HD inline Rgb transmittance(const SceneView& scene, Ray ray, PrimitiveId from, PrimitiveId to,
                                 bool to_camera = false) {
     if (!scene.has_transparency && !(to_camera && scene.hides_from_camera))
-        return any_hit(scene, ray, from, to) ? Rgb{} : rgb(1);
+        return find_any(scene, ray, from, to) ? Rgb{} : rgb(1);
     Rgb through = rgb(1);
     PrimitiveId skip = from;
     for (int i = 0; i < k_max_transparent; ++i) {
-        const Hit hit = closest_hit(scene, ray, skip);
+        const Hit hit = find_closest(scene, ray, skip);
         if (!hit.found() ||
             (hit.instance == to.instance && hit.primitive == to.primitive && hit.t > 0.999f * ray.t_max)) {
             return through;

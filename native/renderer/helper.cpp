@@ -93,6 +93,7 @@ void Helper::work() {
         std::exception_ptr error;
         try {
             outcome = backend_->run_iteration(iteration, film_, stop_) ? State::finished : State::stopped;
+            backend_->collect(film_);
         } catch (...) {
             error = std::current_exception();
         }

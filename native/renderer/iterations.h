@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -15,13 +16,29 @@ class Iterations {
 public:
     explicit Iterations(uint32_t first) : next_(first) {}
 
+    void restart(uint32_t first) {
+        const std::lock_guard lock(mutex_);
+        next_ = first;
+        given_back_.clear();
+        finished_.clear();
+    }
+
     // The first one below `end` that nobody has taken.
     std::optional<uint32_t> take(uint32_t end) {
         if (!given_back_.empty() && *given_back_.begin() < end) return given_back_.extract(given_back_.begin()).value();
         return next_ < end ? std::optional(next_++) : std::nullopt;
     }
-    // Not done after all.
-    void give_back(uint32_t iteration) { given_back_.insert(iteration); }
+    // Not done after all, whether it was finished or not.
+    void give_back(uint32_t iteration) {
+        given_back_.insert(iteration);
+        const std::lock_guard lock(mutex_);
+        const auto after = finished_.upper_bound(iteration);
+        if (after == finished_.begin() || std::prev(after)->second <= iteration) return;
+        const auto [begin, end] = *std::prev(after);
+        finished_.erase(begin);
+        if (begin < iteration) finished_[begin] = iteration;
+        if (iteration + 1 < end) finished_[iteration + 1] = end;
+    }
 
     void finish(uint32_t iteration) {
         const std::lock_guard lock(mutex_);

@@ -3,9 +3,11 @@
 
 #include <atomic>
 #include <chrono>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,15 +19,19 @@ namespace vlp {
 
 class Scene;
 
+using MakeBackend = std::function<std::unique_ptr<Backend>(const Scene&, const PassSettings&)>;
+
 // What renders: one device, and one that helps it.
 struct Devices {
     std::unique_ptr<Backend> main, helper;  // helper: may be null
-    std::function<std::unique_ptr<Backend>()> spare;  // instead of `main` if that fails and nobody helps; may be empty
-    std::vector<std::string> notes;  // why they are not what was asked for
+    MakeBackend spare;                      // instead of `main` if that fails and nobody helps; may be empty
+    std::vector<std::string> notes;         // why they are not what was asked for
 };
 
-// Those of a setting `device`. Where there is no usable GPU, CUDA and HYBRID come down to the CPU, with a note.
-Devices make_devices(const std::string& device, const Scene& scene, const PassSettings& pass, unsigned threads);
+// Those of a setting `device`. Where there is no usable GPU, CUDA and HYBRID come down to the CPU, with a note. Where the GPU
+// has no room for all light paths, `pass` gets fewer, with a note.
+Devices make_devices(const std::string& device, const Scene& scene, PassSettings& pass, unsigned threads,
+                     const MakeBackend& make_gpu = make_cuda_backend);
 
 class Renderer {
 public:
@@ -43,6 +49,12 @@ public:
     void set_deadline(double seconds);
     // Throws away what a helper has under way. Returns how many iterations it had finished unnoticed.
     uint32_t rest();
+    // Brings what a device has kept to itself into the film, for those who read it; not while `iterate` runs. Returns how
+    // many more iterations there are then: below 0 where the device has failed, and some are lost and to be made again.
+    int settle();
+    // Begins anew, with another scene or the same after a change, and with other settings: devices keep what they need not
+    // make again. Where one fails, as in `iterate`.
+    void update(std::shared_ptr<const Scene> scene, const PassSettings& pass, uint32_t first, uint32_t end);
 
     float progress() const;  // of the iteration under way, 0 to 1
     uint32_t stored_vlps() const { return active_.load()->counters.stored_vlps; }
@@ -52,14 +64,21 @@ public:
     Film& film() { return film_; }
     const Film& film() const { return film_; }
     const Iterations& iterations() const { return iterations_; }
-    size_t backend_bytes() const;
+    uint64_t iteration_count() const { return total_; }  // in the film and still with devices
+    void add_film_state(std::span<const ExactSum> sums, uint64_t iterations);
+    MemoryByDevice memory() const;
+    uint64_t uploaded_bytes() const;  // of scenes, to the devices, so far
     // What the user should hear about the devices: why one was left out.
     std::vector<std::string> notes() const;
 
 private:
     bool collect_from_helper();
-    bool run_one();
-    void go_on_without_main(const char* reason);
+    int run_one();
+    int finish_main();
+    int give_back_lost();
+    int go_on_without_main(const char* reason);
+    void note(const std::string& text);
+    void update_total() { total_ = film_.iterations() + unsaved_.size(); }
 
     std::shared_ptr<const Scene> scene_;
     PassSettings pass_;
@@ -68,10 +87,13 @@ private:
     std::unique_ptr<Backend> main_, instead_of_main_;  // the latter once the former has failed
     std::atomic<Backend*> active_;  // the one of these that renders
     std::unique_ptr<Helper> helper_;
-    std::function<std::unique_ptr<Backend>()> spare_;
+    MakeBackend spare_;
     std::vector<std::string> notes_;
     Iterations iterations_;
     uint32_t end_;
+    std::deque<uint32_t> unsaved_;  // iterations that are finished, but still with the main device
+    std::atomic<uint64_t> total_{0};
+    std::chrono::steady_clock::time_point collected_ = std::chrono::steady_clock::now();  // when it was last begun
     double took_ = 0;  // seconds of the last iteration, without the helper's
     std::atomic<bool> stop_{false};
     std::chrono::steady_clock::time_point deadline_ = std::chrono::steady_clock::time_point::max();

@@ -2,6 +2,7 @@
 #include "scene/scene.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <stdexcept>
 #include <string>
@@ -21,18 +22,39 @@ std::vector<uint16_t> narrow(std::span<const int32_t> slots) {
     return narrowed;
 }
 
-template <typename T>
-size_t bytes_of(const std::vector<T>& v) {
-    return v.capacity() * sizeof(T);
-}
-
 // Where a copy of the vector's elements stands; null when it is empty.
 template <typename T>
-const T* placed(const std::vector<T>& v, const Scene::Place& place) {
-    return v.empty() ? nullptr : static_cast<const T*>(place(v.data(), v.size() * sizeof(T)));
+const T* placed(const std::vector<T>& v, ScenePart part, const Scene::Place& place) {
+    return v.empty() ? nullptr : static_cast<const T*>(place(part, v.data(), v.size() * sizeof(T)));
 }
 
-const void* in_place(const void* data, size_t) { return data; }
+const void* in_place(ScenePart, const void* data, size_t) { return data; }
+
+uint64_t next_revision() {
+    static std::atomic<uint64_t> last{0};
+    return ++last;
+}
+
+bool equal(OctNormal a, OctNormal b) { return a.bits == b.bits; }
+bool equal(Vec2 a, Vec2 b) { return a.x == b.x && a.y == b.y; }
+
+// Smooth meshes say the same at every corner of a vertex, and take a sixth of the room with one value for each. Fills
+// `of_vertex` with these, or returns false where corners of a vertex differ or that would take more.
+template <typename T>
+bool by_vertex(std::span<const T> of_corner, std::span<const Triangle> triangles, size_t vertices,
+               std::vector<T>& of_vertex) {
+    if (of_corner.size() <= vertices) return false;
+    std::vector<T> values(vertices);
+    std::vector<bool> known(vertices);
+    for (size_t i = 0; i < of_corner.size(); ++i) {
+        const uint32_t v = triangles[i / 3].v[i % 3];
+        if (known[v] && !equal(values[v], of_corner[i])) return false;
+        values[v] = of_corner[i];
+        known[v] = true;
+    }
+    of_vertex = std::move(values);
+    return true;
+}
 
 // The factor of a transform that scales every direction alike; 0 when it does not.
 float uniform_scale(const Affine& a) {
@@ -51,38 +73,39 @@ GeometryView Scene::Geometry::view(const Place& place) const {
     GeometryView v;
     v.kind = kind;
     v.primitive_count = static_cast<uint32_t>(kind == GeometryKind::mesh ? triangles.size() : spheres.size());
-    v.positions = placed(positions, place);
-    v.triangles = placed(triangles, place);
-    v.corner_normals = placed(corner_normals, place);
-    v.uvs = placed(uvs, place);
-    v.spheres = placed(spheres, place);
-    v.material_slots = placed(slots, place);
+    const auto put = [&](const auto& array) { return placed(array, ScenePart::geometry, place); };
+    v.positions = put(positions);
+    v.triangles = put(triangles);
+    v.corner_normals = put(corner_normals);
+    v.uvs = put(uvs);
+    v.normals_by_vertex = normals_by_vertex;
+    v.uvs_by_vertex = uvs_by_vertex;
+    v.spheres = put(spheres);
+    v.material_slots = put(slots);
     return v;
 }
 
-size_t Scene::Geometry::bytes() const {
-    return bytes_of(positions) + bytes_of(triangles) + bytes_of(corner_normals) + bytes_of(uvs) + bytes_of(spheres) +
-           bytes_of(slots);
-}
-
-void Scene::require_open() const {
-    if (built_) throw std::logic_error("scene: nothing can be added or built again after build()");
+void Scene::require_open(bool part) const {
+    if (built_ || !part) throw std::logic_error("scene: nothing can be added or built again after build()");
 }
 
 uint32_t Scene::add_mesh(std::span<const Vec3> positions, std::span<const Triangle> triangles,
                          std::span<const Vec3> corner_normals, std::span<const Vec2> uvs,
                          std::span<const int32_t> slots) {
-    require_open();
+    require_open(geometry_open_);
     check_mesh(positions, triangles, corner_normals, uvs, slots);
     Geometry g;
     g.positions.assign(positions.begin(), positions.end());
     g.triangles.assign(triangles.begin(), triangles.end());
-    g.corner_normals.resize(corner_normals.size());
-    for (size_t i = 0; i < corner_normals.size(); ++i) {
+    std::vector<OctNormal> normals(corner_normals.size());
+    for (size_t i = 0; i < normals.size(); ++i) {
         const float l = length(corner_normals[i]);
-        g.corner_normals[i] = encode(l > 0 ? corner_normals[i] / l : Vec3{0, 0, 1});
+        normals[i] = encode(l > 0 ? corner_normals[i] / l : Vec3{0, 0, 1});
     }
-    g.uvs.assign(uvs.begin(), uvs.end());
+    g.normals_by_vertex = by_vertex<OctNormal>(normals, triangles, positions.size(), g.corner_normals);
+    if (!g.normals_by_vertex) g.corner_normals = std::move(normals);
+    g.uvs_by_vertex = by_vertex<Vec2>(uvs, triangles, positions.size(), g.uvs);
+    if (!g.uvs_by_vertex) g.uvs.assign(uvs.begin(), uvs.end());
     g.slots = narrow(slots);
     geometries_.push_back(std::move(g));
     return static_cast<uint32_t>(geometries_.size() - 1);
@@ -90,7 +113,7 @@ uint32_t Scene::add_mesh(std::span<const Vec3> positions, std::span<const Triang
 
 uint32_t Scene::add_spheres(std::span<const Vec3> centers, std::span<const float> radii,
                             std::span<const int32_t> slots) {
-    require_open();
+    require_open(geometry_open_);
     check_spheres(centers, radii, slots);
     Geometry g;
     g.kind = GeometryKind::spheres;
@@ -102,14 +125,14 @@ uint32_t Scene::add_spheres(std::span<const Vec3> centers, std::span<const float
 }
 
 uint32_t Scene::add_material(std::span<const LobeInput> lobes, Rgb emission) {
-    require_open();
+    require_open(open_.materials);
     materials_.push_back(build_material(lobes, emission, lobes_));
     return static_cast<uint32_t>(materials_.size() - 1);
 }
 
 void Scene::add_instance(uint32_t geometry, const Affine& object_to_world, std::span<const int32_t> materials,
                          uint32_t visibility) {
-    require_open();
+    require_open(geometry_open_);
     check_transform(object_to_world);
     check_indices(materials, materials_.size(), "instance: material of slot");
     if (geometry >= geometries_.size() || materials.empty()) {
@@ -130,14 +153,19 @@ void Scene::add_instance(uint32_t geometry, const Affine& object_to_world, std::
 }
 
 void Scene::add_lamp(Light light, uint32_t visibility) {
-    require_open();
+    require_open(open_.lamps);
     light.visibility = visibility;
     lights_.push_back(light);
     ++info_.lamps;
 }
 
+void Scene::set_world(Rgb radiance) {
+    require_open(open_.world);
+    world_ = radiance;
+}
+
 void Scene::set_world_image(std::span<const Rgb> texels, uint32_t width, uint32_t height, const Vec3 (&to_image)[3]) {
-    require_open();
+    require_open(open_.world);
     check_world_image(texels, width, height);
     world_texels_.assign(texels.begin(), texels.end());
     world_tables_ = make_environment_tables(texels, width, height);
@@ -147,7 +175,7 @@ void Scene::set_world_image(std::span<const Rgb> texels, uint32_t width, uint32_
 }
 
 void Scene::set_camera(const Camera& camera) {
-    require_open();
+    require_open(true);
     const uint32_t width = camera_.width, height = camera_.height;
     camera_ = camera;
     camera_.width = width;
@@ -155,7 +183,7 @@ void Scene::set_camera(const Camera& camera) {
 }
 
 void Scene::set_film(uint32_t width, uint32_t height, Window window, bool transparent) {
-    require_open();
+    require_open(true);
     check_film(width, height, window);
     camera_.width = width;
     camera_.height = height;
@@ -163,15 +191,63 @@ void Scene::set_film(uint32_t width, uint32_t height, Window window, bool transp
     transparent_film_ = transparent;
 }
 
+void Scene::reopen(Opened parts) {
+    if (!built_) throw std::logic_error("scene: reopen() before build()");
+    built_ = false;
+    open_ = parts;
+    if (parts.materials) {
+        materials_.clear();
+        lobes_.clear();
+    }
+    if (parts.lamps) {
+        lights_.clear();
+        info_.lamps = 0;
+    }
+    if (parts.world) {
+        world_ = {};
+        world_texels_.clear();
+        world_tables_ = {};
+        world_view_ = {};
+    }
+}
+
 void Scene::build(unsigned threads) {
-    require_open();
+    require_open(true);
     const auto start = std::chrono::steady_clock::now();
     ThreadPool pool(threads);
-    for (const Geometry& g : geometries_) {
-        geometry_views_.push_back(g.view(in_place));
-        info_.geometry_bytes += g.bytes();
-    }
+    check_material_indices();
+    if (geometry_open_) build_surfaces(pool);
+    build_lights(pool);
+    if (open_.materials) revisions_[ScenePart::materials] = next_revision();
+    if (open_.world) revisions_[ScenePart::world] = next_revision();
+    geometry_open_ = false;
+    open_ = {};
+
+    view_ = view_placed(in_place);
+    view_.geometries = geometry_views_.data();  // the passes' own copy, which lives as long as the scene
+    info_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    built_ = true;
+}
+
+void Scene::build_surfaces(ThreadPool& pool) {
+    for (const Geometry& g : geometries_) geometry_views_.push_back(g.view(in_place));
     bvh_ = build_bvh(geometry_views_, instances_, pool);
+    for (const GeometryView& g : geometry_views_) {
+        (g.kind == GeometryKind::mesh ? info_.triangles : info_.spheres) += g.primitive_count;
+    }
+    info_.instances = instances_.size();
+    for (const ScenePart part : {ScenePart::geometry, ScenePart::bvh, ScenePart::tables}) {
+        revisions_[part] = next_revision();
+    }
+}
+
+void Scene::build_lights(ThreadPool& pool) {
+    std::vector<Rgb> emissions;
+    for (const uint32_t m : material_of_slot_) emissions.push_back(materials_[m].emission);
+    const auto equal = [](Rgb a, Rgb b) { return a.r == b.r && a.g == b.g && a.b == b.b; };
+    const bool same_emitters = !geometry_open_ && std::ranges::equal(emissions, built_emissions_, equal);
+    if (same_emitters && !open_.lamps && !open_.world) return;
+    lights_.resize(info_.lamps);  // without what the last build added
     bound();
     if (!is_black(world_)) {
         lights_.push_back(make_environment(world_));
@@ -179,46 +255,44 @@ void Scene::build(unsigned threads) {
     }
     collect_emitters();
     make_light_tables(pool);
+    if (!same_emitters) revisions_[ScenePart::instances] = next_revision();
+    revisions_[ScenePart::lights] = next_revision();
+    built_emissions_ = std::move(emissions);
+}
 
-    view_ = view_placed(in_place);
-    view_.geometries = geometry_views_.data();  // the passes' own copy, which lives as long as the scene
-
-    for (const GeometryView& g : geometry_views_) {
-        (g.kind == GeometryKind::mesh ? info_.triangles : info_.spheres) += g.primitive_count;
+void Scene::check_material_indices() const {
+    for (const uint32_t m : material_of_slot_) {
+        if (m < materials_.size()) continue;
+        throw std::invalid_argument("instance: material " + std::to_string(m) + ", but there are " +
+                                    std::to_string(materials_.size()));
     }
-    info_.instances = instances_.size();
-    info_.bvh_bytes = bvh_.bytes();
-    info_.light_bytes = bytes_of(lights_) + bytes_of(lamps_.nodes) + bytes_of(world_texels_) +
-                        bytes_of(world_tables_.columns_below) + bytes_of(light_choice_) + bytes_of(light_of_primitive_);
-    info_.material_bytes = bytes_of(materials_) + bytes_of(lobes_) + bytes_of(material_of_slot_) + bytes_of(instances_);
-    info_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    built_ = true;
 }
 
 SceneView Scene::view_placed(const Place& place) const {
+    using enum ScenePart;
     SceneView v;
-    std::vector<GeometryView> geometries;
-    for (const Geometry& g : geometries_) geometries.push_back(g.view(place));
-    v.geometries = placed(geometries, place);
-    v.instances = placed(instances_, place);
-    v.materials = placed(materials_, place);
-    v.lobes = placed(lobes_, place);
-    v.material_of_slot = placed(material_of_slot_, place);
-    v.light_of_primitive = placed(light_of_primitive_, place);
-    v.lights = placed(lights_, place);
-    v.light_choice = {placed(light_choice_, place), static_cast<uint32_t>(light_choice_.size())};
-    v.infinite_lights = placed(infinite_lights_, place);
+    std::vector<GeometryView> views;
+    for (const Geometry& g : geometries_) views.push_back(g.view(place));
+    v.geometries = placed(views, geometry, place);
+    v.instances = placed(instances_, instances, place);
+    v.materials = placed(materials_, materials, place);
+    v.lobes = placed(lobes_, materials, place);
+    v.material_of_slot = placed(material_of_slot_, instances, place);
+    v.light_of_primitive = placed(light_of_primitive_, lights, place);
+    v.lights = placed(lights_, lights, place);
+    v.light_choice = {placed(light_choice_, lights, place), static_cast<uint32_t>(light_choice_.size())};
+    v.infinite_lights = placed(infinite_lights_, lights, place);
     v.infinite_light_count = static_cast<uint32_t>(infinite_lights_.size());
-    v.lamps = {placed(lamps_.lights, place), static_cast<uint32_t>(lamps_.lights.size()),
-               lamps_.nodes.empty() ? nullptr : placed(lamps_.nodes, place), lamps_.root};
+    v.lamps = {placed(lamps_.lights, lights, place), static_cast<uint32_t>(lamps_.lights.size()),
+               placed(lamps_.nodes, lights, place), lamps_.root};
     v.environment = world_view_;
-    v.environment.texels = placed(world_texels_, place);
-    v.environment.rows_below = placed(world_tables_.rows_below, place);
-    v.environment.columns_below = placed(world_tables_.columns_below, place);
-    v.albedo_tables = placed(albedo_tables(), place);
-    v.filter_tables = placed(filter_tables(), place);
-    v.bvh = {placed(bvh_.nodes, place), placed(bvh_.triangle_blocks, place), placed(bvh_.sphere_blocks, place),
-             placed(bvh_.instance_roots, place), bvh_.root};
+    v.environment.texels = placed(world_texels_, world, place);
+    v.environment.rows_below = placed(world_tables_.rows_below, world, place);
+    v.environment.columns_below = placed(world_tables_.columns_below, world, place);
+    v.albedo_tables = placed(albedo_tables(), tables, place);
+    v.filter_tables = placed(filter_tables(), tables, place);
+    v.bvh = {placed(bvh_.nodes, bvh, place), placed(bvh_.triangle_blocks, bvh, place),
+             placed(bvh_.sphere_blocks, bvh, place), placed(bvh_.instance_roots, bvh, place), bvh_.root};
     v.geometry_count = static_cast<uint32_t>(geometries_.size());
     v.instance_count = static_cast<uint32_t>(instances_.size());
     v.light_count = static_cast<uint32_t>(lights_.size());
@@ -228,6 +302,15 @@ SceneView Scene::view_placed(const Place& place) const {
     v.center = center_;
     v.radius = radius_;
     return v;
+}
+
+ByPart<size_t> Scene::bytes(size_t alignment) const {
+    ByPart<size_t> bytes;
+    view_placed([&](ScenePart part, const void* data, size_t size) {
+        bytes[part] += (size + alignment - 1) / alignment * alignment;
+        return data;
+    });
+    return bytes;
 }
 
 // A sphere around every surface and lamp, so that light from infinity reaches all of it.
@@ -241,14 +324,18 @@ void Scene::bound() {
         low = min_of(low, lamp.position - Vec3{reach, reach, reach});
         high = max_of(high, lamp.position + Vec3{reach, reach, reach});
     }
+    center_ = {}, radius_ = 1;
     if (!(low.x <= high.x)) return;
     center_ = (low + high) * 0.5f;
     radius_ = max_of(length(high - low) * 0.5f * 1.0001f, 1e-6f);
 }
 
 void Scene::collect_emitters() {
+    light_of_primitive_.clear();
+    info_.emitters = 0;
     for (uint32_t i = 0; i < instances_.size(); ++i) {
-        const InstanceView& instance = instances_[i];
+        InstanceView& instance = instances_[i];
+        instance.first_emitter = k_none;
         for (uint32_t slot = 0; slot < instance.slot_count; ++slot) {
             if (is_black(materials_[material_of_slot_[instance.first_material + slot]].emission)) continue;
             add_emitters_of(i);
@@ -293,6 +380,7 @@ void Scene::make_light_tables(ThreadPool& pool) {
     for (const Light& light : lights_) powers.push_back(static_cast<double>(power(light, radius_)));
     light_choice_ = make_distribution(powers);
     std::vector<uint32_t> shapes;
+    infinite_lights_.clear();
     for (uint32_t i = 0; i < lights_.size(); ++i) {
         const Light& light = lights_[i];
         if (is_delta(light) || light.instance != k_none) continue;

@@ -1,6 +1,7 @@
 // The scene that owns its data: filled datablock by datablock, built once, then read by the passes as a SceneView.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <span>
 #include <vector>
@@ -15,9 +16,24 @@
 
 namespace vlp {
 
+// What of a scene changes apart from the rest, and takes memory on a device. The camera and the film take none.
+enum class ScenePart : uint8_t { geometry, bvh, instances, materials, lights, world, tables };
+inline constexpr std::array<const char*, 7> k_scene_part_names{"geometry", "bvh",   "instances", "materials",
+                                                               "lights",   "world", "tables"};
+
+// A number for each part of a scene.
+template <typename T>
+struct ByPart {
+    std::array<T, k_scene_part_names.size()> of{};
+
+    T& operator[](ScenePart part) { return of[static_cast<size_t>(part)]; }
+    const T& operator[](ScenePart part) const { return of[static_cast<size_t>(part)]; }
+};
+
 class Scene {
 public:
-    // Those that add something throw std::invalid_argument naming the value at fault, and std::logic_error after `build`.
+    // Those that add something throw std::invalid_argument naming the value at fault, and std::logic_error after `build`,
+    // but for what `reopen` has opened again.
 
     // Index of the new geometry. `corner_normals` (3 a triangle), `uvs` (3 a triangle) and `slots` may be empty.
     uint32_t add_mesh(std::span<const Vec3> positions, std::span<const Triangle> triangles,
@@ -29,7 +45,7 @@ public:
     void add_instance(uint32_t geometry, const Affine& object_to_world, std::span<const int32_t> materials,
                       uint32_t visibility);
     void add_lamp(Light light, uint32_t visibility);
-    void set_world(Rgb radiance) { world_ = radiance; }
+    void set_world(Rgb radiance);
     // Instead of a constant: an equirectangular picture, `height` rows of `width` texels, row 0 at the pole below, and the
     // rotation from the world to it.
     void set_world_image(std::span<const Rgb> texels, uint32_t width, uint32_t height, const Vec3 (&to_image)[3]);
@@ -38,19 +54,30 @@ public:
 
     // Builds the tree and the table of lights. Afterwards nothing may be added.
     void build(unsigned threads);
+    // What `reopen` takes out. The camera and the film can be set again in any case; geometry and instances stay.
+    struct Opened {
+        bool materials = false, lamps = false, world = false;
+    };
+    // After `build`: takes parts out, to be added anew before the next `build`, which makes only what depends on them. No
+    // view of the scene may be used until then. There must be a material for each that instances have.
+    void reopen(Opened parts);
 
     const SceneView& view() const { return view_; }
-    // The same with every array where `place(data, bytes)` says that a copy of it stands: how a GPU gets the scene.
-    using Place = std::function<const void*(const void* data, size_t bytes)>;
+    // The same with every array where `place(part, data, bytes)` says that a copy of it stands: how a GPU gets the scene.
+    using Place = std::function<const void*(ScenePart part, const void* data, size_t bytes)>;
     SceneView view_placed(const Place& place) const;
+    // Changes with what is in the part, and is another for each scene.
+    uint64_t revision(ScenePart part) const { return revisions_[part]; }
     const Window& window() const { return window_; }
     bool transparent_film() const { return transparent_film_; }
     bool built() const { return built_; }
 
+    // What the arrays of each part take where each begins at a multiple of `alignment`.
+    ByPart<size_t> bytes(size_t alignment = 1) const;
+
     struct Info {
         uint64_t triangles = 0, spheres = 0, instances = 0, lamps = 0, emitters = 0;
-        uint64_t geometry_bytes = 0, bvh_bytes = 0, light_bytes = 0, material_bytes = 0;
-        double build_seconds = 0;
+        double build_seconds = 0;  // of the last build
     };
     const Info& info() const { return info_; }
 
@@ -61,14 +88,17 @@ private:
         std::vector<Triangle> triangles;
         std::vector<OctNormal> corner_normals;
         std::vector<Vec2> uvs;
+        bool normals_by_vertex = false, uvs_by_vertex = false;
         std::vector<Sphere> spheres;
         std::vector<uint16_t> slots;
 
         GeometryView view(const Place& place) const;
-        size_t bytes() const;
     };
 
-    void require_open() const;
+    void require_open(bool part) const;
+    void build_surfaces(ThreadPool& pool);
+    void build_lights(ThreadPool& pool);  // the lamps are there; adds what else shines
+    void check_material_indices() const;
     void bound();
     void collect_emitters();
     void make_light_tables(ThreadPool& pool);
@@ -91,6 +121,10 @@ private:
     Camera camera_;
     Window window_;
     bool transparent_film_ = false, built_ = false;
+    bool geometry_open_ = true;
+    Opened open_{true, true, true};
+    std::vector<Rgb> built_emissions_;  // of the instances' materials, as the table of lights has them
+    ByPart<uint64_t> revisions_;
     Bvh bvh_;
     SceneView view_;
     Info info_;

@@ -33,8 +33,9 @@ struct GeometryView {
     uint32_t primitive_count = 0;
     const Vec3* positions = nullptr;            // mesh
     const Triangle* triangles = nullptr;        // mesh
-    const OctNormal* corner_normals = nullptr;  // mesh: 3 a triangle; null: flat
-    const Vec2* uvs = nullptr;                  // mesh: 3 a triangle, active set; null: none
+    const OctNormal* corner_normals = nullptr;  // mesh; null: flat
+    const Vec2* uvs = nullptr;                  // mesh, active set; null: none
+    bool normals_by_vertex = false, uvs_by_vertex = false;  // one a position, else 3 a triangle
     const Sphere* spheres = nullptr;            // spheres
     const uint16_t* material_slots = nullptr;   // one a primitive; null: slot 0
 };

@@ -17,9 +17,10 @@ from ._progress import ProgressDisplay, lost_light_text, summary_text
 from .denoise import denoise
 from .errors import Cancelled, DeviceError, Error, SceneError
 from .images import ALBEDO, NOISY, NORMAL, Depth, check_output, read_image, write_image
+from .memory import memory_lines, total_text
 from .merge import merge_images
-from .render import Renderer, devices, load_native, native_errors
-from .scene import Mesh, Scene
+from .render import Progress, Renderer, devices, load_native, native_errors
+from .scene import Film, Mesh, Scene
 from .settings import FROM_MODE, Device, RenderSettings
 from .snapshot import SUFFIX, Snapshot, load_snapshot, save_snapshot, scene_digest
 from .strategies import SHEET, make_folder, render_strategies, write_strategies
@@ -101,9 +102,11 @@ def _parser() -> _Parser:
         "info",
         _info,
         "tell what a scene or a picture holds, or, without a file, what this machine renders on",
-        "vlp-bpt info\nvlp-bpt info room.vlp.npz\nvlp-bpt info room.exr",
+        "vlp-bpt info\nvlp-bpt info room.exr\nvlp-bpt info room.vlp.npz --resolution 1920x1080 --set mode=REFERENCE",
     )
     info.add_argument("file", type=Path, nargs="?", metavar="FILE")
+    info.add_argument("--resolution", metavar="WxH", help="of a scene: what a render of so many pixels takes")
+    _add_settings(info)
 
     compare = command(
         "compare",
@@ -174,13 +177,7 @@ def _add_render(render: argparse.ArgumentParser) -> None:
         metavar="A:B",
         help="render iterations A to B-1 and keep exact sums in the .exr for vlp-bpt merge",
     )
-    render.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help=f"any setting: {', '.join(RenderSettings().to_dict())}",
-    )
+    _add_settings(render)
     render.add_argument(
         "--debug-strategies",
         type=Path,
@@ -190,6 +187,16 @@ def _add_render(render: argparse.ArgumentParser) -> None:
         "vertices from 2 on and a column for each s from 0 on",
     )
     render.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def _add_settings(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"any setting: {', '.join(RenderSettings().to_dict())}",
+    )
 
 
 def _add_output(command: argparse.ArgumentParser, *, required: bool = True) -> None:
@@ -229,6 +236,7 @@ def _render(options: argparse.Namespace) -> int:
     warnings += renderer.warnings
     _warn(warnings)
     with ProgressDisplay(quiet=options.quiet) as display:
+        _tell_memory(options, renderer)
         image = renderer.render(lambda progress: display.show(renderer, progress))
     _warn([warning for warning in renderer.warnings if warning not in warnings])  # of a device that has failed
     image.metadata["source"] = snapshot.metadata | {"file": options.file.name}
@@ -274,8 +282,17 @@ def _render_strategies(options: argparse.Namespace, kind: str) -> int:
 def _render_blend(options: argparse.Namespace, values: dict[str, Any]) -> int:
     from ._blender import render_blend
 
+    told: list[Renderer] = []
+
     with ProgressDisplay(quiet=options.quiet) as display:
-        result = render_blend(options.file, options.output, options.depth, options.frame, values, display.show)
+
+        def show(renderer: Renderer, progress: Progress) -> None:
+            if renderer not in told:
+                told.append(renderer)
+                _tell_memory(options, renderer)
+            display.show(renderer, progress)
+
+        result = render_blend(options.file, options.output, options.depth, options.frame, values, show)
     _warn(result.warnings)
     if not result.renderers:
         raise SceneError(f"'{options.file}': Blender did not render it with VLP-BPT")
@@ -307,7 +324,9 @@ def _info(options: argparse.Namespace) -> int:
             print(f"{device['kind']}: {device['name']} ({device['isa']}{memory})")
         return 0
     if options.file.suffix.lower() in (".blend", ".npz"):
-        return _info_scene(options.file)
+        return _info_scene(options)
+    if options.resolution or options.set:
+        raise UsageError(f"'{options.file}': --resolution and --set are for scenes")
     image = read_image(options.file)
     height, width, _ = image.pixels.shape
     mean = ", ".join(f"{x:.5g}" for x in image.pixels[..., :3].mean(axis=(0, 1), dtype=float))
@@ -321,12 +340,15 @@ def _info(options: argparse.Namespace) -> int:
     return 0
 
 
-def _info_scene(path: Path) -> int:
+def _info_scene(options: argparse.Namespace) -> int:
+    path, values = options.file, _setting_values(options)
     if _scene_kind(path) == "blend":
-        snapshot, warnings = _capture(path, None, {})
+        snapshot, warnings = _capture(path, None, values)
     else:
         snapshot, warnings = load_snapshot(path), []
     scene = snapshot.scene
+    if options.resolution:
+        scene.film = Film(*_resolution(options.resolution), transparent=scene.film.transparent)
     warnings += [warning for warning in scene.validate() if warning not in warnings]
     x, y, width, height = scene.film.render_window
     print(f"{path}: {_scene_text(scene)}")
@@ -341,8 +363,9 @@ def _info_scene(path: Path) -> int:
         native_scene.build(0)
     info = native_scene.info()
     print(f"  glowing triangles and spheres: {info['emitters']}; built in {info['build_seconds']:.3f} s")
-    parts = ", ".join(f"{name} {size / 2**20:.2f}" for name, size in info["bytes"].items())
-    print(f"  memory (MiB): {parts}")
+    settings = RenderSettings.from_dict(_with_mode_first((snapshot.settings or RenderSettings()).to_dict(), values))
+    for line in memory_lines(scene, native_scene, settings):
+        print(f"  {line}")
     _warn(warnings)
     return 0
 
@@ -412,14 +435,11 @@ def _setting_values(options: argparse.Namespace) -> dict[str, Any]:
         if not equals:
             raise UsageError(f"--set {text}: must be NAME=VALUE")
         texts[name.strip()] = value
-    named = {
-        "samples": options.samples,
-        "time_limit": options.time,
-        "noise_threshold": options.noise,
-        "device": options.device,
-        "seed": options.seed,
-    }
-    texts |= {name: value for name, value in named.items() if value is not None}
+    named = {"samples": "samples", "time_limit": "time", "noise_threshold": "noise", "device": "device", "seed": "seed"}
+    for name, option in named.items():
+        value = getattr(options, option, None)
+        if value is not None:
+            texts[name] = value
     settings = RenderSettings.from_strings(texts).to_dict()
     return {name: settings[name] for name in texts}
 
@@ -447,6 +467,14 @@ def _iterations(options: argparse.Namespace) -> tuple[int, int] | None:
     return begin, end
 
 
+def _resolution(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise UsageError(f"--resolution {text}: must be WxH, two whole numbers") from None
+    return width, height
+
+
 def _capture(path: Path, frame: int | None, values: dict[str, Any]) -> tuple[Snapshot, list[str]]:
     from ._blender import capture_blend
 
@@ -459,6 +487,11 @@ def _capture(path: Path, frame: int | None, values: dict[str, Any]) -> tuple[Sna
 def _warn(warnings: list[str]) -> None:
     for warning in dict.fromkeys(warnings):
         print(f"vlp-bpt: warning: {warning}", file=sys.stderr)
+
+
+def _tell_memory(options: argparse.Namespace, renderer: Renderer) -> None:
+    if not options.quiet:
+        print(f"{options.file}: takes {total_text(renderer.memory)}", file=sys.stderr, flush=True)
 
 
 def _finish(output: Path, renderer: Renderer) -> int:

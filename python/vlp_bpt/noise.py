@@ -79,8 +79,7 @@ class NoiseMeter:
         """The count, above `iterations`, at which `look` wants to see the picture; infinite without a threshold."""
         if self.threshold <= 0:
             return math.inf
-        if iterations < self._looked:  # some were lost with a device: the means that are kept have light of theirs
-            self._looked, self._kept, self.noise, self.expected = 0, [], None, None
+        self._forget_lost(iterations)
         doubled = FIRST_MEAN << (iterations // FIRST_MEAN).bit_length()
         if self.expected is None or self.expected <= iterations:
             return doubled
@@ -93,6 +92,7 @@ class NoiseMeter:
         """
         if self.threshold <= 0 or iterations < FIRST_MEAN:
             return False
+        self._forget_lost(iterations)
         if iterations != self._looked:
             self._measure(iterations, luminance_of(read()))
         return self._enough
@@ -104,6 +104,11 @@ class NoiseMeter:
     @property
     def _enough(self) -> bool:
         return self.noise is not None and self.noise <= self.threshold and self._looked >= LEAST_ITERATIONS
+
+    def _forget_lost(self, iterations: int) -> None:
+        """Begins anew where a device that failed took iterations with it: they are in the means that are kept."""
+        if iterations < self._looked:
+            self._looked, self._kept, self.noise, self.expected = 0, [], None, None
 
     def _measure(self, n: int, luminance: Float32) -> None:
         self._looked = n

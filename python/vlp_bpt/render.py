@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import denoise
+from .changes import changes, kept
 from .errors import Cancelled, DeviceError, Error, SceneError
 from .images import ALBEDO, NOISY, NORMAL, Image
 from .noise import NoiseMeter
 from .scene import Scene
 from .settings import RenderSettings
-from .upload import upload
+from .upload import upload, upload_changes
+from .validation import validate
 
 _POLL_SECONDS = 0.05  # how often a running pass is asked about: cancelling takes no longer than this
 _REPORT_SECONDS = 0.2  # most time between two reports of progress, as far as iterations are that short
@@ -49,10 +51,10 @@ class Progress:
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a render did and took. eye_samples and light_paths: in all; memory: bytes by part; dropped: non-finite
-    samples left out; build_seconds: uploading the scene and building its hierarchy; denoise_seconds: of denoising the
-    last picture, not part of seconds; noise: of the picture before denoising, as `vlp_bpt.noise` measures it, None
-    without `noise_threshold` and before it was told."""
+    """What a render did and took. eye_samples and light_paths: in all; memory: bytes by device and part; dropped:
+    non-finite samples left out; build_seconds: uploading the scene and building its hierarchy, as far as it changed;
+    denoise_seconds: of denoising the last picture, not part of seconds; noise: of the picture before denoising, as
+    `vlp_bpt.noise` measures it, None without `noise_threshold` and before it was told."""
 
     iterations: int
     seconds: float
@@ -61,7 +63,7 @@ class Statistics:
     light_paths: int
     vlps: int
     dropped: int
-    memory: dict[str, int]
+    memory: dict[str, dict[str, int]]
     denoise_seconds: float = 0.0
     noise: float | None = None
 
@@ -75,7 +77,7 @@ class Statistics:
 
     @property
     def memory_bytes(self) -> int:
-        return sum(self.memory.values())
+        return sum(sum(parts.values()) for parts in self.memory.values())
 
 
 class Renderer:
@@ -91,10 +93,9 @@ class Renderer:
     def __init__(self, scene: Scene, settings: RenderSettings | None = None, *, first_iteration: int = 0) -> None:
         self._warnings = scene.validate()
         self.film = scene.film
-        self.settings = (settings or RenderSettings()).resolved(scene.film.width, scene.film.height)
+        self._asked = settings or RenderSettings()
+        self.settings = self._checked(self._asked, scene, first_iteration)
         self.first_iteration = first_iteration
-        if not 0 <= first_iteration < 2**31 - self.settings.samples:
-            raise SceneError(f"first_iteration {first_iteration} must be from 0 to {2**31 - self.settings.samples - 1}")
         self.interrupted = False  # the last `render` was ended by KeyboardInterrupt
         self._lock = threading.Lock()
         self._stop = threading.Event()
@@ -103,14 +104,55 @@ class Renderer:
         if self.settings.denoise:
             denoise.load()  # not only after an hour
         started = time.perf_counter()
-        native = load_native()
         with native_errors():
-            self._scene = native.Scene()
-            upload(scene, self._scene)
-            self._scene.build(self.settings.threads)
-            options = self.settings.to_dict() | {"iteration_begin": first_iteration}
-            self._native = native.Renderer(self._scene, options)
+            self._scene = _built_scene(scene, self.settings.threads)
+            self._native = load_native().Renderer(self._scene, self._options())
+        self._known = kept(scene)  # what self._scene holds
         self._build_seconds = time.perf_counter() - started
+
+    def update(self, scene: Scene | None = None, settings: RenderSettings | None = None) -> None:
+        """Begins anew with another scene, other settings or both, at `first_iteration`.
+
+        What is the same is neither built nor uploaded again: after another camera nothing, after another material the
+        materials, after other geometry or instances everything. The scene may be the one of before with other fields;
+        an array whose elements were changed in place goes unnoticed. Waits for an iteration under way. When it raises,
+        the next `update` must bring what can be rendered.
+        """
+        new_scene = scene if scene is not None else self._known
+        changed = changes(self._known, new_scene)
+        warnings = validate(new_scene, geometry_is_known=not changed.geometry)
+        asked = settings or self._asked
+        new_settings = self._checked(asked, new_scene, self.first_iteration)
+        if new_settings.denoise:
+            denoise.load()
+        same_devices = (new_settings.device, new_settings.threads) == (self.settings.device, self.settings.threads)
+        with self._lock, native_errors():
+            started = time.perf_counter()
+            self._known = Scene()  # nothing of which anything can be taken over, should this fail
+            if changed.geometry:
+                self._scene = _built_scene(new_scene, new_settings.threads)
+            else:
+                upload_changes(new_scene, changed, self._scene)
+                self._scene.build(new_settings.threads)
+            self._known = kept(new_scene)
+            self._warnings, self.film = warnings, new_scene.film
+            self._asked, self.settings = asked, new_settings
+            if same_devices:
+                self._native.update(self._scene, self._options())
+            else:
+                self._native = load_native().Renderer(self._scene, self._options())
+            self._seconds = self._denoise_seconds = 0.0
+            self._build_seconds = time.perf_counter() - started
+
+    @staticmethod
+    def _checked(settings: RenderSettings, scene: Scene, first_iteration: int) -> RenderSettings:
+        resolved = settings.resolved(scene.film.width, scene.film.height)
+        if not 0 <= first_iteration < 2**31 - resolved.samples:
+            raise SceneError(f"first_iteration {first_iteration} must be from 0 to {2**31 - resolved.samples - 1}")
+        return resolved
+
+    def _options(self) -> dict[str, Any]:
+        return self.settings.to_dict() | {"iteration_begin": self.first_iteration}
 
     @property
     def warnings(self) -> list[str]:
@@ -140,10 +182,22 @@ class Renderer:
             light_paths=rendered * int(self._native.light_paths),
             vlps=int(self._native.vlps),
             dropped=int(self._native.dropped),
-            memory={name: int(size) for name, size in self._native.memory().items()},
+            memory=self.memory,
             denoise_seconds=self._denoise_seconds,
             noise=self._noise.noise,
         )
+
+    @property
+    def memory(self) -> dict[str, dict[str, int]]:
+        """Bytes by device ("CPU": the machine's own memory) and by what they are for."""
+        return {
+            device: {part: int(size) for part, size in parts.items()} for device, parts in self._native.memory().items()
+        }
+
+    @property
+    def uploaded_bytes(self) -> int:
+        """What of scenes was copied to a GPU so far, by this renderer's making and its updates."""
+        return int(self._native.uploaded_bytes)
 
     def iterate(self, count: int = 1, poll: Callable[[], bool] | None = None) -> int:
         """Renders up to `count` further iterations and returns how many were completed.
@@ -259,9 +313,12 @@ class Renderer:
         from . import __version__
 
         statistics = asdict(self.statistics)
+        settings = self.settings.to_dict()
+        if 0 < self._native.light_paths < settings["light_paths"]:
+            settings["light_paths"] = int(self._native.light_paths)  # a GPU had no room for more
         return {
             "version": __version__,
-            "settings": self.settings.to_dict(),
+            "settings": settings,
             "iterations": self.iterations,
             "ranges": [list(range_) for range_ in sorted(self._native.ranges.items())],
             "seconds": round(self._seconds, 3),
@@ -324,6 +381,16 @@ class _Session:
         self.done = 0
 
     def run(self) -> None:
+        while True:
+            self._render()
+            # A device that fails while it is read loses what it alone had.
+            with self.renderer._lock, native_errors():
+                change = int(self.renderer._native.settle())
+            self.done += change
+            if change >= 0:
+                return
+
+    def _render(self) -> None:
         renderer, settings, noise = self.renderer, self.renderer.settings, self.renderer._noise
         chunk = 1
         while self.done < settings.samples and not self._stopped():
@@ -369,6 +436,13 @@ class _Session:
         remaining = seconds * (1 - fraction) / fraction if fraction > 0 else None
         noise = self.renderer._noise.noise
         self.report(Progress(self.done, settings.samples, fraction, seconds, remaining, picture, noise))
+
+
+def _built_scene(scene: Scene, threads: int) -> Any:
+    native_scene = load_native().Scene()
+    upload(scene, native_scene)
+    native_scene.build(threads)
+    return native_scene
 
 
 def devices() -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .changes import Changes
 from .errors import SceneError
 from .scene import AreaLight, Camera, Film, Float32, Light, Material, Mesh, PointLight, Scene, Spheres, SpotLight, World
 
@@ -23,6 +24,24 @@ def upload(scene: Scene, native_scene: Any) -> None:
     for light in scene.lights:
         _add_light(light, native_scene)
     _set_world(scene.world, native_scene)
+    _set_view(scene, native_scene)
+
+
+def upload_changes(scene: Scene, changed: Changes, native_scene: Any) -> None:
+    """Makes a built native scene hold `scene`, whose geometry is the same; it must be built again."""
+    native_scene.reopen(changed.materials, changed.lamps, changed.world)
+    if changed.materials:
+        for material in scene.materials:
+            _add_material(material, native_scene)
+    if changed.lamps:
+        for light in scene.lights:
+            _add_light(light, native_scene)
+    if changed.world:
+        _set_world(scene.world, native_scene)
+    _set_view(scene, native_scene)
+
+
+def _set_view(scene: Scene, native_scene: Any) -> None:
     if scene.camera is None:
         raise SceneError("scene: has no camera")
     _set_camera(scene.camera, native_scene)

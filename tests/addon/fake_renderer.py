@@ -32,7 +32,7 @@ class FakeRenderer:
     @property
     def statistics(self) -> Statistics:
         count = self.iterations
-        return Statistics(count, 1.5 * count, 0.1, 1000 * count, 500 * count, 42, 0, {"film": 2**20})
+        return Statistics(count, 1.5 * count, 0.1, 1000 * count, 500 * count, 42, 0, {"CPU": {"film": 2**20}})
 
     def render(self, progress: Callable[[Progress], None], cancel: Any) -> Image:
         samples = self.settings.samples

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from threading import Timer
 
 import numpy as np
@@ -10,7 +11,10 @@ import pytest
 from on_device import DEVICE, SCENES, load, picture, renderer
 
 from vlp_bpt import Renderer, RenderSettings, denoise, devices
+from vlp_bpt.memory import plan_memory
+from vlp_bpt.render import load_native
 from vlp_bpt.scene import Film
+from vlp_bpt.upload import upload
 
 MODES = ("PAPER", "BALANCED", "REFERENCE")
 
@@ -104,6 +108,64 @@ def test_memory_that_cannot_be_had_is_named_and_the_cpu_renders(monkeypatch: pyt
         assert made.iterate(2) == 2
     monkeypatch.delenv("VLP_BPT_GPU_MEMORY")
     assert not Renderer(scene, RenderSettings(samples=2, device="CUDA")).warnings  # type: ignore[arg-type]
+
+
+def test_memory_is_what_was_planned() -> None:
+    scene = load("indirect_room")
+    settings = RenderSettings.from_dict({"samples": 2, "device": DEVICE})
+    native_scene = load_native().Scene()
+    upload(scene, native_scene)
+    native_scene.build(0)
+    planned = plan_memory(scene, native_scene, settings)
+    made = renderer(scene, filter="BLACKMAN_HARRIS")
+    assert made.memory == planned
+    print(planned)
+
+
+def test_light_paths_are_halved_until_they_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the same random numbers as a render of so many light paths."""
+    if DEVICE == "CPU":
+        pytest.skip("needs a GPU")
+    scene = load("cornell_box")
+    settings = RenderSettings.from_dict({"samples": 4, "device": DEVICE, "light_paths": 64_000, "filter": "BOX"})
+    asked = Renderer(scene, settings).memory["CUDA"]
+    in_buffers = sum(size for part, size in asked.items() if part != "stacks")
+    monkeypatch.setenv("VLP_BPT_GPU_MEMORY", str(in_buffers - asked["light_vertices"] * 3 // 5))
+    made = Renderer(scene, settings)
+    (warning,) = made.warnings
+    assert warning == "device CUDA: out of memory for 64000 light paths; rendering with 16000"
+    assert made.iterate(4) == 4
+    assert made.metadata()["settings"]["light_paths"] == 16_000
+    monkeypatch.delenv("VLP_BPT_GPU_MEMORY")
+    np.testing.assert_array_equal(made.film_state(), renderer(scene, light_paths=16_000).film_state())
+
+
+def test_updates_upload_what_has_changed() -> None:
+    scene = load("cornell_box")
+    made = renderer(scene)
+    uploaded = made.uploaded_bytes
+    assert (uploaded > 0) == (DEVICE != "CPU")
+    assert scene.camera is not None
+    scene.camera.half_width *= 0.8
+    made.update(scene)
+    assert made.uploaded_bytes == uploaded
+    scene.materials[0] = replace(scene.materials[1], name="other")
+    made.update(scene)
+    assert made.uploaded_bytes - uploaded < 20_000
+    assert made.iterate(4) == 4
+    np.testing.assert_array_equal(made.film_state(), renderer(scene).film_state())
+
+
+def test_a_picture_may_be_read_at_any_time() -> None:
+    """Sums come from the device while it goes on: nothing is lost or counted twice."""
+    scene = load("indirect_room")
+    made = renderer(scene, iterations=1)
+    for count in (1, 3, 2):
+        made.read()
+        assert made.iterate(count) == count
+    made.read()
+    assert made.iterations == 7
+    np.testing.assert_array_equal(made.film_state(), renderer(scene, iterations=7).film_state())
 
 
 def test_it_stops_at_once() -> None:

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/surface.h"
+#include "scene/scene.h"
 #include "tests/native/bvh_oracle.h"
 
 namespace vlp::test {
@@ -203,6 +204,49 @@ TEST(Surface, MaterialSlots) {
     EXPECT_EQ(surface_of(view, 0, 0, 0.2f, 0.2f).material, 72u);
     EXPECT_EQ(surface_of(view, 0, 1, 0.2f, 0.2f).material, 71u);
     EXPECT_EQ(surface_of(view, 0, 2, 0.2f, 0.2f).material, 73u) << "slots beyond the last use the last";
+}
+
+// Attributes that are the same at every corner of a vertex are kept once a vertex, and give the same surface.
+TEST(Surface, AttributesByVertexOrByCorner) {
+    std::mt19937 random(9);
+    std::vector<Vec3> positions, normals;
+    std::vector<Vec2> uvs;
+    for (int i = 0; i < 12; ++i) {
+        positions.push_back(random_point(random, 1));
+        normals.push_back(random_direction(random));
+        uvs.push_back({random_point(random, 2).x, random_point(random, 2).y});
+    }
+    std::vector<Triangle> triangles;
+    for (uint32_t i = 0; i < 10; ++i) triangles.push_back({{i, i + 1, i + 2}});
+    std::vector<Vec3> of_corner_normals;
+    std::vector<Vec2> of_corner_uvs;
+    for (const Triangle& t : triangles) {
+        for (const uint32_t v : t.v) of_corner_normals.push_back(normals[v]), of_corner_uvs.push_back(uvs[v]);
+    }
+    const auto scene_of = [&] {
+        auto scene = std::make_unique<Scene>();
+        scene->add_material({}, {});
+        scene->add_mesh(positions, triangles, of_corner_normals, of_corner_uvs, {});
+        scene->add_instance(0, {}, std::vector<int32_t>{0}, 1);
+        scene->build(1);
+        return scene;
+    };
+    const auto by_vertex = scene_of();
+    triangles.push_back({{0, 1, 2}});  // whose corners differ from those before
+    for (int i = 0; i < 3; ++i) of_corner_normals.push_back({0, 0, 1}), of_corner_uvs.push_back({5, 5});
+    const auto by_corner = scene_of();
+    EXPECT_TRUE(by_vertex->view().geometries[0].normals_by_vertex && by_vertex->view().geometries[0].uvs_by_vertex);
+    EXPECT_FALSE(by_corner->view().geometries[0].normals_by_vertex || by_corner->view().geometries[0].uvs_by_vertex);
+    EXPECT_EQ(by_vertex->bytes()[ScenePart::geometry], sizeof(GeometryView) + 10 * 12 + 12 * (12 + 4 + 8));
+    EXPECT_EQ(by_corner->bytes()[ScenePart::geometry], sizeof(GeometryView) + 12 * 12 + 11 * (12 + 3 * (4 + 8)));
+    for (uint32_t i = 0; i < 10; ++i) {
+        const SurfacePoint a = surface_of(by_vertex->view(), 0, i, 0.25f, 0.5f),
+                           b = surface_of(by_corner->view(), 0, i, 0.25f, 0.5f);
+        expect_near(a.shading_normal, b.shading_normal, 0);
+        EXPECT_EQ(a.uv.x, b.uv.x);
+        EXPECT_EQ(a.uv.y, b.uv.y);
+        EXPECT_NEAR(a.uv.x, 0.25f * (uvs[i].x + uvs[i + 1].x) + 0.5f * uvs[i + 2].x, 1e-6f);
+    }
 }
 
 }  // namespace

@@ -39,7 +39,8 @@ public:
         counters.dropped += 1;
         return true;
     }
-    size_t bytes() const override { return 8; }
+    void update(const Scene&, const PassSettings&) override {}
+    void add_memory(MemoryByDevice& memory) const override { memory["FAKE"].work += 8; }
 
     std::atomic<int> runs{0};
 
@@ -90,7 +91,7 @@ TEST(TwoDevices, ShareTheIterations) {
     EXPECT_GE(pair.helper->runs, 5);
     EXPECT_GE(pair.main->runs, 5);
     EXPECT_EQ(pair.renderer->dropped(), 20u);
-    EXPECT_EQ(pair.renderer->backend_bytes(), 16u);
+    EXPECT_EQ(pair.renderer->memory()["FAKE"].total(), 16u);
 }
 
 // The fast one does not wait for what the slow one will not finish in time: it takes it over.
@@ -195,7 +196,7 @@ TEST(TwoDevices, CanBeAskedWhileTheyRender) {
             for (const auto& [begin, end] : pair.done()) done += end - begin;
             EXPECT_LE(done, 60u);
             EXPECT_LE(pair.renderer->notes().size(), 1u);
-            EXPECT_LE(pair.renderer->backend_bytes(), 16u);
+            EXPECT_LE(pair.renderer->memory()["FAKE"].total(), 16u);
             EXPECT_LE(pair.renderer->dropped(), 60u);
             EXPECT_LE(pair.renderer->progress(), 1);
         }
@@ -207,9 +208,11 @@ TEST(TwoDevices, CanBeAskedWhileTheyRender) {
 }
 
 TEST(OneDevice, ASpareTakesOverWhenItFails) {
-    Devices devices{
-        std::make_unique<FakeDevice>(0ms, 2), nullptr, [] { return std::make_unique<FakeDevice>(0ms); }, {}};
-    Renderer renderer(nullptr, PassSettings{}, k_window, std::move(devices), 0, 5);
+    const auto scene = std::make_shared<Scene>();
+    scene->build(1);
+    const auto spare = [](const Scene&, const PassSettings&) { return std::make_unique<FakeDevice>(0ms); };
+    Renderer renderer(scene, PassSettings{}, k_window, {std::make_unique<FakeDevice>(0ms, 2), nullptr, spare, {}}, 0,
+                      5);
     EXPECT_EQ(renderer.iterate(5), 5u);
     EXPECT_EQ(renderer.film().sums()[0].value(), 31);
     EXPECT_EQ(renderer.notes().size(), 1u);

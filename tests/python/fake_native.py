@@ -28,10 +28,12 @@ class FakeScene:
 
 
 class FakeRenderer:
-    """Iteration i adds i + 1 to every pixel and takes `seconds`; `fails` is raised by the next `iterate`."""
+    """Iteration i adds i + 1 to every pixel and takes `seconds`; `fails` is raised by the next `iterate`,
+    and the next `settle` loses the last `loses` iterations."""
 
     seconds = 0.0
     fails: BaseException | None = None
+    loses = 0  # iterations, when it is next settled
 
     def __init__(self, scene: FakeScene, settings: dict[str, Any]) -> None:
         ((self.width, self.height, _, _, *window, _),) = scene.arguments("set_film")
@@ -85,11 +87,18 @@ class FakeRenderer:
     def read(self, out: np.ndarray[Any, Any]) -> None:
         out[...] = self.total / max(self.iterations, 1)
 
-    def memory(self) -> dict[str, int]:
-        return {"film": 100, "bvh": 20}
+    def settle(self) -> int:
+        lost, FakeRenderer.loses = FakeRenderer.loses, 0
+        self.next -= lost
+        self.iterations -= lost
+        self.total -= sum(self.next + 1 + i for i in range(lost))
+        return -lost
+
+    def memory(self) -> dict[str, dict[str, int]]:
+        return {"CPU": {"film": 100, "bvh": 20}}
 
 
 def module() -> Any:
     """What stands in for `vlp_bpt._native`."""
-    FakeRenderer.seconds, FakeRenderer.fails = 0.0, None
+    FakeRenderer.seconds, FakeRenderer.fails, FakeRenderer.loses = 0.0, None, 0
     return SimpleNamespace(Scene=FakeScene, Renderer=FakeRenderer, devices=lambda: [{"name": "fake", "kind": "CPU"}])

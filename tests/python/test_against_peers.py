@@ -18,8 +18,8 @@ from peer_scenes import MAKERS, blend
 from stats import assert_agree, compare
 
 from vlp_bpt import Renderer, RenderSettings, Scene
-from vlp_bpt.bench import find_scene, load_scene, mesh_variant, native_file
-from vlp_bpt.bench.references import batches, cycles_batches, fingerprint, mitsuba_batches
+from vlp_bpt.bench.references import batches, cycles_batches, fingerprint, mitsuba_batches, native_file
+from vlp_bpt.bench.scenes import find_scene, load_scene, mesh_variant
 from vlp_bpt.snapshot import scene_digest
 
 SIZE = 64

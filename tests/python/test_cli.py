@@ -56,6 +56,7 @@ def test_help_teaches(folder: Path) -> None:
 def test_render_writes_a_picture_and_says_what_it_took(folder: Path) -> None:
     result = vlp_bpt(folder, "render", "room.vlp.npz", "-o", "a.exr")
     assert re.fullmatch(r"a\.exr: 6 iterations, \d+\.\d\d s, \d+\.\d{3} Msamples/s, .*\n", result.stdout)
+    assert re.fullmatch(r"room\.vlp\.npz: takes CPU \d+\.\d MiB\n", result.stderr)
     image = read_image(folder / "a.exr")
     assert image.pixels.shape == (16, 24, 4)
     assert image.metadata["settings"]["mode"] == "PAPER"
@@ -158,7 +159,7 @@ def test_info(folder: Path) -> None:
     scene = vlp_bpt(folder, "info", "room.vlp.npz").stdout
     assert "10 triangles, 0 spheres, 1 instances, 1 materials, 1 lights" in scene
     assert "24 x 16 pixels" in scene
-    assert "memory (MiB): " in scene
+    assert "memory to render with device=CPU (MiB): CPU " in scene
     assert 'note: "hi"' in scene
     picture = vlp_bpt(folder, "info", "grey.exr").stdout
     assert "grey.exr: 24 x 16 pixels, mean (0.5, 0.5, 0.5)" in picture
@@ -170,7 +171,9 @@ def test_warnings_do_not_stop_a_render(folder: Path) -> None:
     scene.lights = []
     save_snapshot(folder / "dark.vlp.npz", Snapshot(scene))
     result = vlp_bpt(folder, "render", "dark.vlp.npz", "-o", "a.exr", "--samples", "1")
-    assert result.stderr == "vlp-bpt: warning: scene: nothing emits light, the picture will be black\n"
+    warning, memory = result.stderr.splitlines()
+    assert warning == "vlp-bpt: warning: scene: nothing emits light, the picture will be black"
+    assert memory.startswith("dark.vlp.npz: takes CPU ")
 
 
 RENDER = ("render", "room.vlp.npz", "-o", "a.exr")
@@ -238,9 +241,10 @@ def test_a_scene_that_cannot_be_rendered(folder: Path) -> None:
 @pytest.mark.parametrize("device", ["CUDA", "HYBRID"])
 def test_without_a_gpu_the_cpu_renders_and_one_line_says_so(folder: Path, device: str) -> None:
     result = vlp_bpt(folder, *RENDER, "--device", device)
-    (line,) = result.stderr.splitlines()
+    line, memory = result.stderr.splitlines()
     assert line.startswith("vlp-bpt: warning: device CUDA: ")
     assert line.endswith("; rendering on the CPU")
+    assert memory.startswith("room.vlp.npz: takes CPU ")
 
 
 def test_interrupting_keeps_the_picture(folder: Path) -> None:

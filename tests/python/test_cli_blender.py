@@ -115,7 +115,9 @@ def test_a_frame_can_be_chosen(folder: Path) -> None:
 def test_every_view_layer_is_told_of_and_warnings_come_once(folder: Path) -> None:
     result = vlp_bpt(folder, "render", "layers.blend", "-o", "a.exr", "--samples", "1")
     assert result.stdout.count("1 iterations") == 2
-    (warning,) = result.stderr.splitlines()
+    *memory, warning = result.stderr.splitlines()
+    assert len(memory) == 2
+    assert all(line.startswith("layers.blend: takes CPU ") for line in memory)
     assert warning.startswith("vlp-bpt: warning: ")
     assert "Noise Texture" in warning
 

@@ -135,6 +135,8 @@ def test_iterations_that_are_lost_are_forgotten() -> None:
     means = noisy_means(0.3, seed=2)
     assert not meter.look(32, lambda: means(32))
     assert meter.look(64, lambda: means(64))
+    assert not meter.look(40, lambda: means(40))
+    assert meter.noise is None
 
 
 def test_without_a_threshold_nothing_is_read() -> None:

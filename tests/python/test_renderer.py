@@ -119,6 +119,24 @@ def test_statistics_count_what_was_rendered(fake: Any) -> None:
     assert found.eye_samples_per_second == pytest.approx(8 * 192 / found.seconds)
 
 
+def test_iterations_that_a_device_loses_at_the_end_are_rendered_again(fake: Any) -> None:
+    renderer = make(8)
+    fake.loses = 3
+    image = renderer.render()
+    assert image.metadata["ranges"] == [[0, 8]]
+    assert (image.pixels == 4.5).all()  # mean of 1 to 8
+    assert sum(renderer._native.asked) == 11
+
+
+def test_the_light_paths_that_there_was_room_for_are_told(fake: Any) -> None:
+    renderer = make(2, light_paths=100)
+    assert renderer.metadata()["settings"]["light_paths"] == 100
+    renderer._native.light_paths = 25
+    assert renderer.metadata()["settings"]["light_paths"] == 25
+    renderer._native.light_paths = 0  # none are needed
+    assert renderer.metadata()["settings"]["light_paths"] == 100
+
+
 def test_progress_is_told_often_and_ends_at_one(fake: Any) -> None:
     fake.seconds = 0.01
     told: list[tuple[float, Progress]] = []

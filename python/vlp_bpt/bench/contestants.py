@@ -1,9 +1,12 @@
-"""What the benchmark races: this renderer in some setting, and Cycles; slices of each add up to one picture."""
+"""What the benchmarks race: this renderer in some setting, and its peers; slices of each add up to one picture."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +17,10 @@ from vlp_bpt.render import Renderer
 from vlp_bpt.scene import Scene
 from vlp_bpt.settings import RenderSettings
 
-from . import cycles
+from . import cycles, luxcore, mitsuba
 
 Pixels = NDArray[np.float64]
+SPARED = 4  # times what a launch of Mitsuba's costs without samples: no slice is shorter
 CYCLES_SEQUENCE = 1 << 16  # samples of the one sequence that all slices belong to
 
 
@@ -38,6 +42,19 @@ class Contestant:
     def iterations(self) -> int | None:
         """Iterations so far, None for a renderer that has none."""
         return None
+
+    @property
+    def shortest(self) -> float:
+        """Seconds of the shortest slice that does not waste time."""
+        return 0.0
+
+    @property
+    def notes(self) -> list[str]:
+        """What is not the same as in the scene, in whole clauses."""
+        return []
+
+    def prepare(self) -> None:
+        """Load the scene and warm up, untimed; raises Error for a scene that this renderer cannot render."""
 
     def run(self, seconds: float) -> None:
         """Render about that long."""
@@ -77,6 +94,10 @@ class Ours(Contestant):
     def iterations(self) -> int | None:
         return self.renderer.iterations
 
+    def prepare(self) -> None:
+        if self.renderer.warnings:
+            print(f"{self.name}: {'; '.join(self.renderer.warnings)}", flush=True)
+
     def run(self, seconds: float) -> None:
         renderer = self.renderer
         before = renderer.statistics
@@ -94,12 +115,15 @@ class Ours(Contestant):
 
 @dataclass
 class Cycles(Contestant):
-    """Cycles in the same process: slices of one sample sequence, as long as the pace so far says."""
+    """Cycles: slices of one sample sequence, as long as the pace so far says."""
 
     blend: Path
     size: tuple[int, int]
     scatterings: int
     threads: int = 0
+    seed: int = 0
+    box: bool = False  # a filter of one pixel, not Blackman-Harris
+    _pace: float = field(default=0.0, init=False)
     _samples: int = field(default=0, init=False)
     _sum: Pixels | None = field(default=None, init=False)
 
@@ -107,15 +131,27 @@ class Cycles(Contestant):
     def window(self) -> str:
         return f"max bounces {self.scatterings - 1}"
 
+    def prepare(self) -> None:
+        self._pace = self._first_pace(self._open())
+
     def run(self, seconds: float) -> None:
-        scene = cycles.open_scene(self.blend)
-        cycles.set_size(scene, *self.size)
-        pace = self.seconds / self._samples if self._samples else self._first_pace(scene)
-        image = self._render(scene, max(1, round(seconds / pace)), self._samples)
+        scene = self._open()
+        if self._samples:
+            self._pace = self.seconds / self._samples
+        elif not self._pace:
+            self._pace = self._first_pace(scene)
+        image = self._render(scene, max(1, round(seconds / self._pace)), self._samples)
         weighted = image.pixels[..., :3].astype(np.float64) * image.samples
         self._sum = weighted if self._sum is None else self._sum + weighted
         self._samples += image.samples
         self._count(image.seconds, image.samples * self.size[0] * self.size[1])
+
+    def _open(self) -> Any:
+        scene = cycles.open_scene(self.blend)
+        cycles.set_size(scene, *self.size)
+        if self.box:
+            scene.cycles.pixel_filter_type = "BOX"
+        return scene
 
     def picture(self) -> Pixels:
         if self._sum is None:
@@ -136,16 +172,120 @@ class Cycles(Contestant):
             scatterings=self.scatterings,
             first=first,
             total=CYCLES_SEQUENCE,
+            seed=self.seed,
             threads=self.threads,
         )
 
 
+@dataclass
+class Mitsuba(Contestant):
+    """Mitsuba's path tracer: launches of as many samples as the pace so far says."""
+
+    scene: Scene
+    scatterings: int
+    seed: int = 0
+    _loaded: Any = field(default=None, init=False, repr=False)
+    _launches: int = field(default=0, init=False)
+    _overhead: float = field(default=0.0, init=False)  # seconds of a launch without samples
+    _pace: float = field(default=0.0, init=False)  # seconds of a sample of every pixel
+    _samples: int = field(default=0, init=False)
+    _sum: Pixels | None = field(default=None, init=False, repr=False)
+
+    @property
+    def window(self) -> str:
+        return f"{mitsuba.variant()}, max_depth {self.scatterings + 1}"
+
+    @property
+    def shortest(self) -> float:
+        return SPARED * self._overhead
+
+    def prepare(self) -> None:
+        self._loaded = mitsuba.load(self.scene, self.scatterings)
+        mitsuba.launch(self._loaded, 1, 0)  # compiles
+        one, some = (_seconds(partial(mitsuba.launch, self._loaded, samples, 0)) for samples in (1, 5))
+        self._pace = max((some - one) / 4, 1e-4)
+        self._overhead = max(one - self._pace, 0.0)
+
+    def run(self, seconds: float) -> None:
+        began, spent, made = time.perf_counter(), 0.0, 0
+        pixels = self.scene.film.width * self.scene.film.height
+        most = max(1, mitsuba.PASS // pixels)
+        while not made or seconds - spent > self._overhead + 0.5 * self._pace:
+            samples = max(1, min(most, round((seconds - spent - self._overhead) / self._pace)))
+            self._launches += 1
+            part = samples * mitsuba.launch(self._loaded, samples, (self.seed << 20) + self._launches)
+            self._sum = part if self._sum is None else self._sum + part
+            made += samples
+            took = time.perf_counter() - began - spent
+            spent += took
+            if took > 2 * self._overhead:
+                self._pace = (took - self._overhead) / samples
+        self._samples += made
+        self._count(spent, made * pixels)
+
+    def picture(self) -> Pixels:
+        if self._sum is None:
+            raise RuntimeError(f"{self.name} has not rendered yet")
+        return self._sum / self._samples
+
+
+LUXCORE_DEPTH = 10  # hits of each of the two walks of BIDIRCPU, which joins every pair of their vertices
+LUXCORE_LONGEST = 1 << 16  # hits before roulette: never, as BIDIRCPU is too bright with it
+
+
+@dataclass
+class LuxCore(Contestant):
+    """LuxCore's path tracer (PATHCPU, roulette as it comes) or bidirectional one (BIDIRCPU, without roulette)."""
+
+    scene: Scene
+    engine: str
+    scatterings: int
+    threads: int = 0
+    seed: int = 0
+    _session: Any = field(default=None, init=False, repr=False)
+
+    @property
+    def window(self) -> str:
+        return f"{LUXCORE_DEPTH} + {LUXCORE_DEPTH} hits" if self.engine == "BIDIRCPU" else f"{self.scatterings} hits"
+
+    @property
+    def notes(self) -> list[str]:
+        return [] if self._session is None else list(self._session.notes)
+
+    def prepare(self) -> None:
+        if self.engine == "BIDIRCPU":
+            # These depths count the vertex on the light, or on the lens.
+            values = {"light.maxdepth": LUXCORE_DEPTH + 1, "path.maxdepth": LUXCORE_DEPTH + 1}
+            values |= {"path.russianroulette.depth": LUXCORE_LONGEST}
+        else:
+            kinds = ("total", "diffuse", "glossy", "specular")
+            values = {f"path.pathdepth.{kind}": self.scatterings + 1 for kind in kinds}
+        threads = self.threads or os.cpu_count() or 1
+        self._session = luxcore.Session(self.scene, self.engine, values, threads=threads, seed=self.seed)
+
+    def run(self, seconds: float) -> None:
+        self._count(*self._session.run(seconds))
+
+    def picture(self) -> Pixels:
+        return np.asarray(self._session.picture(), np.float64)
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
 def race(
-    contestants: list[Contestant], seconds: float, rounds: int, observe: Callable[[Contestant, int], None]
+    contestants: Sequence[Contestant], instants: Sequence[float], observe: Callable[[Contestant, int], None]
 ) -> None:
-    """Each contestant gets `seconds` in `rounds` slices, in turns, the order turned round each time, so that whatever
-    else the machine does meets all alike. `observe(contestant, round)` is called after each slice, untimed."""
-    for index in range(rounds):
+    """Each contestant renders up to each of `instants` (seconds of its own) by turns, the order turned round each time,
+    so that whatever else the machine does meets all alike. One that is past an instant already, as samples are not
+    cut short, or for which the slice would be too short, sits it out. `observe(contestant, index)` is called after
+    each instant, untimed."""
+    for index, instant in enumerate(instants):
         for contestant in contestants if index % 2 == 0 else contestants[::-1]:
-            contestant.run(seconds / rounds)
+            left = instant - contestant.seconds
+            if left > 0 and (left >= contestant.shortest or index == len(instants) - 1):
+                contestant.run(left)
             observe(contestant, index)

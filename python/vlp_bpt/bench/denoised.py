@@ -1,4 +1,4 @@
-"""Error over time with Open Image Denoise, ours beside Cycles: `python -m vlp_bpt.bench.denoised cornell_box`.
+"""Error over time with Open Image Denoise, ours beside Cycles.
 
 Each render starts anew and is denoised once at its end; seconds are of both, without reading and preparing the scene.
 """
@@ -6,8 +6,7 @@ Each render starts anew and is denoised once at its end; seconds are of both, wi
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vlp_bpt import metrics
-from vlp_bpt.errors import Error
 from vlp_bpt.render import Renderer
 from vlp_bpt.scene import Scene
 from vlp_bpt.settings import MODE_PRESETS, Mode, RenderSettings
 
-from . import cycles, find_scene, load_scene, reference_halves
+from . import cycles
+from .references import our_halves
+from .scenes import find_scene, load_scene
 
 Halves = tuple[NDArray[np.float64], NDArray[np.float64]]
 Render = Callable[[int], tuple[float, NDArray[np.float32]]]  # samples -> seconds, (h, w, 3 or more) top row first
@@ -115,25 +115,11 @@ def run(options: argparse.Namespace) -> None:
     """Prints each render and, per contestant, the seconds to an SSIM."""
     path = find_scene(options.scene)
     scene = load_scene(path, options.size)
-    halves = reference_halves(path.stem, scene, options.reference_seconds, options.threads)
+    halves = our_halves(
+        path.stem, scene, {"mode": Mode.REFERENCE, "threads": options.threads}, options.reference_seconds
+    )
     renders = contestants(path, scene, options.threads)
     points = measure(renders, halves, options.samples, options.ssim)
     for name in renders:
         seconds = seconds_to([point for point in points if point.name == name], options.ssim)
         print(f"{name}: SSIM {options.ssim:g} " + ("not reached" if seconds is None else f"after {seconds:.1f} s"))
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs it and returns the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m vlp_bpt.bench.denoised", description=__doc__)
-    add_arguments(parser)
-    try:
-        run(parser.parse_args(arguments))
-    except Error as error:
-        print(f"vlp-bpt: {error}", file=sys.stderr)
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -52,7 +52,7 @@ FAR = 1e4  # radii of the scene
 BACK = 1e-4  # of a mesh's extent
 SMOOTH = 0.0038  # Blender's roughness below which a lobe is a delta distribution
 MOST_ALPHA = 0.25
-PASS = 1 << 22  # samples of one launch: bounds its memory
+PASS = 1 << 26  # most samples of one launch: it cannot be interrupted
 
 
 class NotConvertible(Error):
@@ -82,15 +82,24 @@ def module() -> Any:
 
 def render(scene: Scene, *, samples: int, scatterings: int, seed: int = 0) -> NDArray[np.float32]:
     """(h, w, 3) linear RGB, top row first, under a box filter of one pixel; `scatterings` as in bench/cycles.py."""
-    mi = module()
-    loaded = mi.load_dict(convert(scene, scatterings))
+    loaded = load(scene, scatterings)
     film = scene.film
-    launch = max(1, PASS // (film.width * film.height))
+    most = max(1, PASS // (film.width * film.height))
     total = np.zeros((film.height, film.width, 3))
-    for i, first in enumerate(range(0, samples, launch)):
-        count = min(launch, samples - first)
-        total += count * np.asarray(mi.render(loaded, spp=count, seed=(seed << 12) + i), np.float64)[..., :3]
+    for i, first in enumerate(range(0, samples, most)):
+        count = min(most, samples - first)
+        total += count * launch(loaded, count, (seed << 12) + i)
     return (total / samples).astype(np.float32)
+
+
+def load(scene: Scene, scatterings: int) -> Any:
+    """The scene as Mitsuba's; raises NotConvertible."""
+    return module().load_dict(convert(scene, scatterings))
+
+
+def launch(loaded: Any, samples: int, seed: int) -> Doubles:
+    """(h, w, 3) of one launch of `samples` a pixel."""
+    return np.asarray(module().render(loaded, spp=samples, seed=seed), np.float64)[..., :3]
 
 
 def convert(scene: Scene, scatterings: int) -> dict[str, Any]:
@@ -98,6 +107,8 @@ def convert(scene: Scene, scatterings: int) -> dict[str, Any]:
     mi = module()
     if scene.camera is None:
         raise NotConvertible("the scene has no camera")
+    if scene.world.image is not None:
+        raise NotConvertible(f"world '{scene.world.name}' has an image")
     shown = {bool(light.visibility & Visibility.CAMERA): light.name for light in scene.lights if _has_extent(light)}
     glows = any(any(scene.materials[m].emission) for i in scene.instances for m in i.materials)
     if False in shown and (True in shown or glows or any(scene.world.radiance)):
@@ -261,12 +272,13 @@ def _spheres(
     scale = float(np.sqrt(square[0, 0]))
     if not np.allclose(square, scale * scale * np.eye(3), atol=1e-5 * scale * scale):
         raise NotConvertible(f"instance '{name}' makes ellipsoids of its spheres")
+    shared = module().load_dict(_bsdf(material))  # one for all: vector code visits materials one after the other
     for center, radius in zip(geometry.centers[members], geometry.radii[members], strict=True):
         placed = matrix[:, :3] @ center + matrix[:, 3]
-        yield _sphere(placed, scale * float(radius), _bsdf(material), material.emission)
+        yield _sphere(placed, scale * float(radius), shared, material.emission)
 
 
-def _sphere(center: Any, radius: float, bsdf: dict[str, Any], emission: Rgb) -> dict[str, Any]:
+def _sphere(center: Any, radius: float, bsdf: Any, emission: Rgb) -> dict[str, Any]:
     result = {"type": "sphere", "center": [float(x) for x in center], "radius": radius, "bsdf": bsdf}
     if any(emission):
         result["emitter"] = {"type": "area", "radiance": _rgb(emission)}

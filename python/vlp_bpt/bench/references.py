@@ -5,13 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vlp_bpt.render import Renderer, load_native
 from vlp_bpt.scene import Scene
+from vlp_bpt.settings import RenderSettings
 from vlp_bpt.snapshot import scene_digest
 
 FOLDER = Path("out/references")
@@ -39,6 +42,29 @@ def batches(
             partial.replace(path)
         result.append(np.load(path, allow_pickle=False))
     return np.stack(result)
+
+
+def native_file() -> Path:
+    """The native core's file: what a kept picture of ours depends on besides its scene and settings."""
+    return Path(load_native()._module.__file__)
+
+
+def our_halves(
+    name: str, scene: Scene, settings: dict[str, Any], seconds: float, folder: Path = FOLDER
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Two independent pictures of ours (h, w, 3), top row first, of `seconds` each; made once and kept."""
+    window = RenderSettings(**settings, samples=1 << 30, time_limit=seconds)
+    kept = {key: value for key, value in window.to_dict().items() if key not in ("threads", "seed")}
+    film = scene.film.width, scene.film.height, scene.film.window  # the digest leaves it out
+    key = fingerprint([native_file()], {"scene": scene_digest(scene), "film": film, **kept})
+
+    def make(index: int) -> NDArray[np.float32]:
+        print(f"{name}: {window.mode} reference, half {index + 1} of 2, {seconds:.0f} s, kept in {folder}/", flush=True)
+        image = Renderer(scene, replace(window, seed=1001 + index)).render()
+        return np.ascontiguousarray(image.pixels[::-1, :, :3])
+
+    first, second = batches(f"{name}-{window.mode.lower()}", key, 2, make, folder)
+    return first.astype(np.float64), second.astype(np.float64)
 
 
 def cycles_batches(

@@ -1,0 +1,292 @@
+// The GPU back end: one thread a path, sums of the film that stay on the device. What it asks of the device is below, so that
+// the host can stand in for one in tests.
+#pragma once
+
+#include <algorithm>
+#include <array>
+
+#include "backend/backend.h"
+#include "backend/device_buffer.h"
+#include "backend/gpu_kernels.h"
+
+namespace vlp {
+
+// A Device queues work in two queues, each in order, and throws std::runtime_error for what goes wrong, then or later:
+//   k_name                                       for messages
+//   void* allocate(bytes, on_host)               null: there is no room
+//   release(data, on_host)
+//   upload(to, from, bytes)                      done when it returns
+//   clear(to, bytes)                             queued in Queue::passes, as are the next two
+//   launch(begin, end, body)                     body(i) for every i of [begin, end)
+//   scan(counts, n, scratch, scratch_bytes)      inclusive sums in place
+//   download(queue, to, from, bytes)            queued; `to` is memory on the host from `allocate`
+//   Event, record(event, queue)                 an event is over when what was queued before is done; at first it is
+//   queue_wait(queue, event)                    what is queued next waits for it
+//   wait(event), bool is_over(event)
+//   size_t stack_bytes()                         of the threads of the passes that run at a time
+enum class Queue : uint8_t { passes, copies };
+
+template <typename Device>
+class GpuBackend final : public Backend {
+public:
+    // `arguments` make the device.
+    template <typename... Arguments>
+    GpuBackend(const Scene& scene, const PassSettings& pass, Arguments&&... arguments)
+        : device_(std::forward<Arguments>(arguments)...) {
+        counts_ = buffer<PassCounts>(1, "counts");
+        counts_here_ = DeviceBuffer<PassCounts, Device>(device_, 1, "counts on the host", true);
+        update(scene, pass);
+    }
+    GpuBackend(const GpuBackend&) = delete;
+    GpuBackend& operator=(const GpuBackend&) = delete;
+    // Buffers may not go while the device writes to them.
+    ~GpuBackend() override {
+        try {
+            wait_for_all();
+        } catch (const std::runtime_error&) {  // what is lost was told when it was waited for
+        }
+    }
+
+    void update(const Scene& scene, const PassSettings& pass) override {
+        wait_for_all();
+        kept_ = downloading_ = 0;
+        splats_are_clear_ = false;
+        counters.dropped = 0;
+        *counts_here_.data() = {};
+        device_.clear(counts_.data(), counts_.bytes());
+        place_scene(scene);
+        place_film(scene.window(), pass);
+        place_light_vertices(pass);
+    }
+
+    bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
+        if (downloading_ > 0 && device_.is_over(downloaded_)) add_download(film);
+        counters.work_done = 0;
+        counters.work_total = pixels() + (pass_.traces_light() ? pass_.light_paths : 0);
+        if (pass_.traces_light() && !run_light_pass(iteration, stop)) return false;
+        const bool has_vlps = pass_.kappa > 0;
+        const EyePass eye{scene_,         pass_,         iteration,     window_, has_vlps ? slots_.data() : nullptr,
+                          stored_.data(), frame_.data(), counts_.data()};
+        const bool went_on = pass_.guides ? launch_in_batches(pixels(), GuidedEyePass{eye, guides_.data()}, stop)
+                                          : launch_in_batches(pixels(), eye, stop);
+        if (!went_on) return false;
+        device_.download(Queue::passes, counts_here_.data(), counts_.data(), counts_.bytes());
+        if (downloading_ > 0) device_.queue_wait(Queue::passes, downloaded_);
+        const auto channels = static_cast<uint32_t>(film_channels(pass_));
+        device_.launch(0, channels * pixels(),
+                       Commit{frame_.data(), guides_.data(), splats_.data(), point_splats_.data(), sums_.data(),
+                              channels, kept_ == 0});
+        splats_are_clear_ = true;
+        ++kept_;
+        return true;
+    }
+
+    void finish() override {
+        device_.record(finished_, Queue::passes);
+        device_.wait(finished_);
+        counters.dropped = counts_here_.data()->dropped;
+        counters.stored_vlps = pass_.kappa > 0 ? static_cast<uint32_t>(counts_here_.data()->stored_vlps) : 0;
+    }
+
+    uint32_t kept() const override { return kept_ + downloading_; }
+
+    void begin_collect() override {
+        if (downloading_ > 0 || kept_ == 0) return;
+        device_.record(finished_, Queue::passes);
+        device_.queue_wait(Queue::copies, finished_);
+        device_.download(Queue::copies, sums_here_.data(), sums_.data(), sums_.bytes());
+        device_.record(downloaded_, Queue::copies);
+        downloading_ = std::exchange(kept_, 0);
+    }
+
+    void collect(Film& film) override {
+        if (downloading_ > 0) add_download(film);
+        begin_collect();
+        if (downloading_ > 0) add_download(film);
+    }
+
+    uint32_t light_paths(const PassSettings&) const override { return pass_.light_paths; }
+
+    void add_memory(MemoryByDevice& memory) const override {
+        MemoryUse& gpu = memory[Device::k_name];
+        for (size_t part = 0; part < parts_.of.size(); ++part) gpu.scene.of[part] = parts_.of[part].buffer.bytes();
+        gpu.film += frame_.bytes() + guides_.bytes() + splats_.bytes() + point_splats_.bytes() + sums_.bytes();
+        gpu.light_vertices += slots_.bytes() + stored_.bytes();
+        gpu.work += counts_.bytes() + end_of_path_.bytes() + vertices_in_path_.bytes() + scratch_.bytes();
+        gpu.stacks = device_.stack_bytes();
+        memory["CPU"].film += sums_here_.bytes();
+        memory["CPU"].work += counts_here_.bytes();
+    }
+
+private:
+    template <typename T>
+    using Buffer = DeviceBuffer<T, Device>;
+
+    // A part of the scene: its arrays, one after the other.
+    struct Part {
+        Buffer<std::byte> buffer;
+        uint64_t revision = 0;
+    };
+
+    // Bound how long it takes to stop.
+    static constexpr uint32_t k_batch = 1u << 18;
+    // Light paths are halved until they fit, but not below this share of what was asked for.
+    static constexpr uint32_t k_least_share = 64;
+
+    template <typename T>
+    Buffer<T> buffer(size_t count, const std::string& what) {
+        return Buffer<T>(device_, count, what);
+    }
+
+    uint32_t pixels() const { return static_cast<uint32_t>(window_.pixel_count()); }
+
+    void wait_for_all() {
+        for (const Queue queue : {Queue::passes, Queue::copies}) {
+            device_.record(finished_, queue);
+            device_.wait(finished_);
+        }
+    }
+
+    // Uploads the parts that have changed.
+    void place_scene(const Scene& scene) {
+        const ByPart<size_t> bytes = scene.bytes(k_device_alignment);
+        ByPart<bool> changed;
+        for (size_t i = 0; i < bytes.of.size(); ++i) {
+            Part& part = parts_.of[i];
+            const uint64_t revision = scene.revision(static_cast<ScenePart>(i));
+            changed.of[i] = part.revision != revision || part.buffer.bytes() != bytes.of[i];
+            part.revision = revision;
+            if (part.buffer.bytes() == bytes.of[i]) continue;
+            part.buffer = {};  // first, to have its room
+            part.buffer = buffer<std::byte>(bytes.of[i], std::string("the scene's ") + k_scene_part_names[i]);
+        }
+        ByPart<size_t> end;
+        scene_ = scene.view_placed([&](ScenePart part, const void* data, size_t size) -> const void* {
+            std::byte* const to = parts_[part].buffer.data() + end[part];
+            end[part] += (size + k_device_alignment - 1) / k_device_alignment * k_device_alignment;
+            if (changed[part]) {
+                device_.upload(to, data, size);
+                counters.uploaded += size;
+            }
+            return to;
+        });
+    }
+
+    void place_film(Window window, const PassSettings& pass) {
+        window_ = window;
+        const size_t pixels = window.pixel_count();
+        resize(frame_, pixels, "the film");
+        resize(guides_, pass.guides ? pixels : 0, "a denoiser's guides");
+        resize(sums_, pixels * film_channels(pass), "the film's sums");
+        resize(splats_, pass.splats ? pixels * 3 : 0, "splats");
+        resize(point_splats_, pass.splats && pass.guides ? pixels * 3 : 0, "splats");
+        if (sums_here_.size() != sums_.size()) {
+            sums_here_ = {};
+            sums_here_ = Buffer<ExactSum>(device_, sums_.size(), "the film's sums on the host", true);
+        }
+    }
+
+    // Of as many light paths as there is room for: all, a half, a quarter, ...
+    void place_light_vertices(const PassSettings& pass) {
+        const bool traced = pass.traces_light();
+        for (pass_ = pass;; pass_.light_paths /= 2) {
+            try {
+                resize(slots_, traced ? light_vertex_capacity(pass_) : 0, "light vertices");
+                resize(stored_, slots_.size(), "the list of virtual light points");
+                const uint32_t paths = traced ? pass_.light_paths : 0;
+                resize(end_of_path_, paths, "counts of virtual light points");
+                resize(vertices_in_path_, paths, "counts of light vertices");
+                resize(scratch_, traced ? scan_bytes(paths) : 0, "a scan");
+                start_passes();
+                return;
+            } catch (const OutOfDeviceMemory&) {
+                slots_ = {}, stored_ = {};
+                if (!traced || pass_.light_paths / 2 < std::max(1u, pass.light_paths / k_least_share)) throw;
+            }
+        }
+    }
+
+    template <typename T>
+    void resize(Buffer<T>& old, size_t count, const char* what) {
+        if (old.size() == count) return;
+        old = {};  // first, to have its room
+        old = buffer<T>(count, what);
+    }
+
+    // For no path, so that the device reserves its stacks now and not in the middle of a render.
+    void start_passes() {
+        device_.launch(0, 0, LightPass{});
+        if (pass_.guides) {
+            device_.launch(0, 0, GuidedEyePass{});
+        } else {
+            device_.launch(0, 0, EyePass{});
+        }
+        device_.record(finished_, Queue::passes);
+        device_.wait(finished_);
+    }
+
+    bool run_light_pass(uint32_t iteration, const std::atomic<bool>& stop) {
+        if (!std::exchange(splats_are_clear_, false)) {
+            device_.clear(splats_.data(), splats_.bytes());
+            device_.clear(point_splats_.data(), point_splats_.bytes());
+        }
+        const LightPass light{scene_,
+                              pass_,
+                              iteration,
+                              window_,
+                              slots_.data(),
+                              end_of_path_.data(),
+                              vertices_in_path_.data(),
+                              splats_.data(),
+                              point_splats_.data(),
+                              counts_.data()};
+        if (!launch_in_batches(pass_.light_paths, light, stop)) return false;
+        if (!(pass_.kappa > 0)) return true;
+        device_.scan(end_of_path_.data(), pass_.light_paths, scratch_.data(), scratch_.bytes());
+        device_.launch(0, pass_.light_paths,
+                       ListStored{pass_, slots_.data(), end_of_path_.data(), vertices_in_path_.data(), stored_.data(),
+                                  counts_.data()});
+        return true;
+    }
+
+    // Queues body(i) for i below `count`, two batches ahead of the device at most. Whether `stop` let it.
+    template <typename Body>
+    bool launch_in_batches(uint32_t count, const Body& body, const std::atomic<bool>& stop) {
+        for (uint32_t first = 0; first < count; first += k_batch) {
+            if (stop) return false;
+            const uint32_t end = std::min(count, first + k_batch);
+            auto& before = batches_[next_batch_++ % batches_.size()];
+            device_.wait(before);
+            device_.launch(first, end, body);
+            device_.record(before, Queue::passes);
+            counters.work_done += end - first;
+        }
+        return !stop;
+    }
+
+    Device device_;
+    PassSettings pass_;
+    SceneView scene_;
+    Window window_;
+    ByPart<Part> parts_;
+    Buffer<LightVertex> slots_;
+    Buffer<uint32_t> stored_, end_of_path_;
+    Buffer<uint8_t> vertices_in_path_;
+    Buffer<std::byte> scratch_;
+    Buffer<PixelSample> frame_;
+    Buffer<GuideSample> guides_;
+    Buffer<ExactSum> splats_, point_splats_, sums_, sums_here_;
+    Buffer<PassCounts> counts_, counts_here_;  // "here": on the host
+    typename Device::Event finished_{device_}, downloaded_{device_};
+    std::array<typename Device::Event, 2> batches_{typename Device::Event{device_}, typename Device::Event{device_}};
+    uint32_t next_batch_ = 0;
+    uint32_t kept_ = 0, downloading_ = 0;  // iterations in sums_, and in what is on its way to sums_here_
+    bool splats_are_clear_ = false;
+
+    void add_download(Film& film) {
+        device_.wait(downloaded_);
+        film.add({sums_here_.data(), sums_here_.size()}, std::exchange(downloading_, 0));
+    }
+};
+
+}  // namespace vlp
