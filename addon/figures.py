@@ -14,6 +14,7 @@ def lines(
     """(label, value) for the panel, from `vlp_bpt.Statistics` and `Renderer.lost_light`."""
     rows = [
         ("Iterations", f"{statistics.iterations:,}"),
+        *([("Noise", f"{statistics.noise:.2g}")] if statistics.noise is not None else []),
         ("Render Time", duration(statistics.seconds)),
         *([("Denoising", duration(statistics.denoise_seconds))] if statistics.denoise_seconds else []),
         ("Total Time", duration(total_seconds)),
@@ -38,6 +39,8 @@ def status(statistics: Any, progress: Any) -> str:
         f"{statistics.vlps:,} VLPs",
         f"Mem {memory(statistics.memory_bytes)}",
     ]
+    if progress.noise is not None:
+        parts.append(f"Noise {progress.noise:.2g}")
     if progress.remaining is not None:
         minutes, seconds = divmod(round(progress.remaining), 60)
         parts.append(f"{minutes // 60}:{minutes % 60:02d}:{seconds:02d} left")

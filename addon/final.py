@@ -261,6 +261,7 @@ def _record(engine: Any, depsgraph: Any, renderer: Any, seconds: float, warnings
         "render_time": figures.duration(taken.seconds),
         "total_time": figures.duration(seconds),
         "iterations": str(taken.iterations),
+        **({} if taken.noise is None else {"noise": f"{taken.noise:.3g}"}),
         "settings": json.dumps(renderer.metadata()["settings"]),
         "version": core.load().__version__,
     }

@@ -54,10 +54,12 @@ class ProgressDisplay:
 
 
 def progress_text(statistics: Statistics, progress: Progress) -> str:
-    """One line: share, iterations, rate, time left."""
+    """One line: share, iterations, rate, noise, time left."""
     parts = [f"{progress.fraction:4.0%}", f"{progress.iterations}/{progress.samples} iterations"]
     if statistics.eye_samples:
         parts.append(f"{statistics.eye_samples_per_second / 1e6:.2f} Msamples/s")
+    if progress.noise is not None:
+        parts.append(f"noise {progress.noise:.2g}")
     if progress.remaining is not None and progress.fraction < 1:
         parts.append(f"{duration(progress.remaining)} left")
     return ", ".join(parts)
@@ -71,7 +73,7 @@ def lost_light_text(share: float, error: float) -> str:
 
 
 def summary_text(statistics: Statistics) -> str:
-    """The closing line of a render: iterations, seconds, samples per second and what else it took."""
+    """The closing line of a render: iterations, seconds, samples per second and what else it took, noise where told."""
     parts = [
         f"{statistics.iterations} iterations",
         f"{statistics.seconds:.2f} s",
@@ -80,6 +82,8 @@ def summary_text(statistics: Statistics) -> str:
         f"{statistics.vlps} virtual light points",
         f"{statistics.memory_bytes / 2**20:.0f} MiB",
     ]
+    if statistics.noise is not None:
+        parts.append(f"noise {statistics.noise:.2g}")
     if statistics.denoise_seconds:
         parts.append(f"denoised in {statistics.denoise_seconds:.2f} s")
     if statistics.dropped:

@@ -150,6 +150,7 @@ _RENDER_EXAMPLES = """
 vlp-bpt render room.blend -o room.png
 vlp-bpt render room.blend -o room.exr --samples 500 --frame 12
 vlp-bpt render room.vlp.npz -o room.exr --time 60
+vlp-bpt render room.vlp.npz -o room.exr --samples 100000 --noise 0.01
 vlp-bpt render room.vlp.npz -o paper.exr --set mode=PAPER --set eye_path_length=5
 vlp-bpt render room.vlp.npz -o part.exr --iterations 500:1000   (then: vlp-bpt merge)
 vlp-bpt render room.vlp.npz --debug-strategies room --samples 64 --set light_path_length=2
@@ -168,6 +169,7 @@ def _add_render(render: argparse.ArgumentParser) -> None:
     render.add_argument("--frame", type=int, help="frame of a .blend (default: its current one)")
     render.add_argument("--samples", metavar="N", help="iterations to render")
     render.add_argument("--time", metavar="SECONDS", help="stop after this long, samples or not")
+    render.add_argument("--noise", metavar="X", help="stop once the noise is as low as X, such as 0.01, samples or not")
     render.add_argument("--device", metavar="NAME", help=f"one of {', '.join(Device)}")
     render.add_argument("--seed", metavar="N", help="another seed, other noise")
     render.add_argument(
@@ -223,7 +225,9 @@ def _render(options: argparse.Namespace) -> int:
     values = _setting_values(options)
     iterations = _iterations(options)
     if iterations is not None:
-        values["samples"] = iterations[1] - iterations[0]
+        if values.get("noise_threshold"):
+            raise UsageError("--iterations says how many iterations to render: leave the noise threshold out")
+        values |= {"samples": iterations[1] - iterations[0], "noise_threshold": 0.0}
     if kind == "blend" and iterations is None:
         return _render_blend(options, values)
     snapshot, warnings, settings = _scene_to_render(options, kind, values)
@@ -258,7 +262,7 @@ def _scene_to_render(
 
 
 def _render_strategies(options: argparse.Namespace, kind: str) -> int:
-    for name in ("output", "iterations", "time"):
+    for name in ("output", "iterations", "time", "noise"):
         if getattr(options, name) is not None:
             raise UsageError(f"--debug-strategies writes pictures of its own: leave --{name} out")
     make_folder(options.debug_strategies)
@@ -431,7 +435,8 @@ def _setting_values(options: argparse.Namespace) -> dict[str, Any]:
         if not equals:
             raise UsageError(f"--set {text}: must be NAME=VALUE")
         texts[name.strip()] = value
-    for name, option in (("samples", "samples"), ("time_limit", "time"), ("device", "device"), ("seed", "seed")):
+    named = {"samples": "samples", "time_limit": "time", "noise_threshold": "noise", "device": "device", "seed": "seed"}
+    for name, option in named.items():
         value = getattr(options, option, None)
         if value is not None:
             texts[name] = value

@@ -13,8 +13,9 @@ from .scene import Film, Scene
 from .settings import Mode, RenderSettings
 
 # What may differ between the parts of one render: how much and where they computed.
-_FREE_SETTINGS = ("samples", "time_limit", "device", "threads", "denoise_prefilter")
-_OF_DENOISING = ("denoised", "denoise_seconds")  # metadata of each picture by itself
+_FREE_SETTINGS = ("samples", "time_limit", "noise_threshold", "device", "threads", "denoise_prefilter")
+_OF_DENOISING = ("denoised", "denoise_seconds")
+_OF_PARTS = (*_OF_DENOISING, "noise")  # metadata of each picture by itself
 
 
 def merge_images(paths: Sequence[str | Path]) -> Image:
@@ -48,7 +49,7 @@ def merge_images(paths: Sequence[str | Path]) -> Image:
         if image.film_state is None or image.film_state.shape != shape:
             raise ImageError(f"'{path}': its exact sums have another size than its film")
         summing.add_film_state(image.film_state, image.metadata["iterations"])
-    metadata = {name: value for name, value in first.metadata.items() if name not in _OF_DENOISING} | {
+    metadata = {name: value for name, value in first.metadata.items() if name not in _OF_PARTS} | {
         "settings": first.metadata["settings"] | {"samples": summing.iterations},
         "iterations": summing.iterations,
         "ranges": ranges,

@@ -17,6 +17,7 @@ from . import denoise
 from .changes import changes, kept
 from .errors import Cancelled, DeviceError, Error, SceneError
 from .images import ALBEDO, NOISY, NORMAL, Image
+from .noise import NoiseMeter
 from .scene import Scene
 from .settings import RenderSettings
 from .upload import upload, upload_changes
@@ -35,8 +36,9 @@ class CancelFlag(Protocol):
 @dataclass(frozen=True)
 class Progress:
     """Where a render stands. iterations: complete ones; samples: how many it was asked for; fraction: 0 to 1, by
-    iterations or by time, whichever is further; seconds: so far; remaining: seconds, None until it can be told;
-    picture: an iteration was completed since the last report, so `Renderer.read` has something new without waiting."""
+    iterations, by time or by noise, whichever is further (back a little where the picture turns out noisier than it
+    seemed); seconds: so far; remaining: seconds, None until it can be told; picture: an iteration was completed since
+    the last report, so `Renderer.read` has something new without waiting; noise: as in Statistics."""
 
     iterations: int
     samples: int
@@ -44,13 +46,15 @@ class Progress:
     seconds: float
     remaining: float | None
     picture: bool
+    noise: float | None = None
 
 
 @dataclass(frozen=True)
 class Statistics:
     """What a render did and took. eye_samples and light_paths: in all; memory: bytes by device and part; dropped:
     non-finite samples left out; build_seconds: uploading the scene and building its hierarchy, as far as it changed;
-    denoise_seconds: of denoising the last picture, not part of seconds."""
+    denoise_seconds: of denoising the last picture, not part of seconds; noise: of the picture before denoising, as
+    `vlp_bpt.noise` measures it, None without `noise_threshold` and before it was told."""
 
     iterations: int
     seconds: float
@@ -61,6 +65,7 @@ class Statistics:
     dropped: int
     memory: dict[str, dict[str, int]]
     denoise_seconds: float = 0.0
+    noise: float | None = None
 
     @property
     def eye_samples_per_second(self) -> float:
@@ -95,6 +100,7 @@ class Renderer:
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._seconds = self._denoise_seconds = 0.0
+        self._noise = NoiseMeter(self.settings.noise_threshold)
         if self.settings.denoise:
             denoise.load()  # not only after an hour
         started = time.perf_counter()
@@ -179,6 +185,7 @@ class Renderer:
             dropped=int(self._native.dropped),
             memory=self.memory,
             denoise_seconds=self._denoise_seconds,
+            noise=self._noise.noise,
         )
 
     @property
@@ -212,7 +219,8 @@ class Renderer:
         self._native.cancel()
 
     def render(self, progress: Callable[[Progress], None] | None = None, cancel: CancelFlag | None = None) -> Image:
-        """Renders `settings.samples` iterations, or fewer when `time_limit` ends them; returns `picture()`.
+        """Renders `settings.samples` iterations, or fewer when `time_limit` or `noise_threshold` ends them; returns
+        `picture()`.
 
         `progress` is called on the calling thread at least four times a second. Setting `cancel`, `cancel()` and
         KeyboardInterrupt all end the render and keep its picture; one iteration is completed whatever the time limit.
@@ -230,6 +238,7 @@ class Renderer:
         if self.iterations == 0:
             raise Cancelled("render: cancelled before its first iteration was complete")
         try:
+            self._noise.look(self.iterations, self.read)
             return self.picture(lambda: self._stop.is_set() or (cancel is not None and cancel.is_set()))
         except KeyboardInterrupt:
             self.interrupted = True
@@ -317,7 +326,7 @@ class Renderer:
             "seed": self.settings.seed,
             "film": {"width": self.film.width, "height": self.film.height, "window": list(self.film.render_window)},
             "statistics": {name: statistics[name] for name in ("eye_samples", "light_paths", "dropped")},
-        }
+        } | ({} if self._noise.noise is None else {"noise": self._noise.noise})
 
     def _guided(self) -> tuple[NDArray[np.float32], ...]:
         """What the denoiser gets: colour, albedo and normal, (height, width, 3). The colour is `read`'s but for splats,
@@ -383,7 +392,7 @@ class _Session:
                 return
 
     def _render(self) -> None:
-        renderer, settings = self.renderer, self.renderer.settings
+        renderer, settings, noise = self.renderer, self.renderer.settings, self.renderer._noise
         chunk = 1
         while self.done < settings.samples and not self._stopped():
             if settings.time_limit > 0 and self.done > 0:
@@ -393,13 +402,15 @@ class _Session:
                 if left <= 0:
                     break
                 renderer._native.set_deadline(left)
-            asked = min(chunk, settings.samples - self.done)
+            look = noise.next_look(renderer.iterations)
+            asked = int(min(chunk, settings.samples - self.done, look - renderer.iterations))
             began = time.perf_counter()
             completed = renderer._iterate(asked, self._poll)
             took = time.perf_counter() - began
             self.done += completed
+            enough = renderer.iterations >= look and noise.look(renderer.iterations, renderer.read)
             self._tell(picture=completed > 0)
-            if completed < asked:
+            if completed < asked or enough:
                 break
             chunk = max(1, min(2 * chunk, int(_REPORT_SECONDS / max(took / completed, 1e-6))))
         renderer._native.set_deadline(0.0)
@@ -421,9 +432,11 @@ class _Session:
         seconds = self.reported - self.started
         by_iterations = (self.done + (0.0 if picture else self.renderer.iteration_fraction)) / settings.samples
         by_time = seconds / settings.time_limit if settings.time_limit > 0 else 0.0
-        fraction = min(max(by_iterations, by_time), 1.0)
+        by_noise = self.renderer._noise.share(self.renderer.iterations)
+        fraction = min(max(by_iterations, by_time, by_noise), 1.0)
         remaining = seconds * (1 - fraction) / fraction if fraction > 0 else None
-        self.report(Progress(self.done, settings.samples, fraction, seconds, remaining, picture))
+        noise = self.renderer._noise.noise
+        self.report(Progress(self.done, settings.samples, fraction, seconds, remaining, picture, noise))
 
 
 def _built_scene(scene: Scene, threads: int) -> Any:

@@ -78,6 +78,7 @@ MODE_PRESETS: dict[Mode, ModePreset] = {
 RANGES: dict[str, tuple[float, float]] = {
     "samples": (1, 2**31 - 1),
     "time_limit": (0.0, 1e9),
+    "noise_threshold": (0.0, 1e9),
     "light_path_length": (0, 64),
     "eye_path_length": (1, 64),
     "light_paths": (0, 2**26),
@@ -92,7 +93,7 @@ RANGES: dict[str, tuple[float, float]] = {
 }
 
 _ENUMS: dict[str, type[StrEnum]] = {"mode": Mode, "weighting": Weighting, "filter": Filter, "device": Device}
-_REALS = ("time_limit", "clamp_direct", "clamp_indirect", "filter_width")
+_REALS = ("time_limit", "noise_threshold", "clamp_direct", "clamp_indirect", "filter_width")
 _SWITCHES = ("splats", "roulette", "hits", "denoise", "denoise_prefilter")
 _ON_OFF = {"on": True, "true": True, "yes": True, "1": True, "off": False, "false": False, "no": False, "0": False}
 # What a mode decides where it is None.
@@ -113,13 +114,14 @@ FROM_MODE = (
 class RenderSettings:
     """What to compute. A field left at None takes the value that `mode` gives it (see `resolved`).
 
-    samples: iterations. time_limit: seconds, 0 for none. light_path_length: L, most surface hits of a light path.
-    eye_path_length: K, most surface hits of an eye path. light_paths: N, light paths of one iteration (0: chosen from
-    the picture's size). vlp_connections: C, virtual light points joined to one eye vertex. vlp_candidates:
-    M, how many each of them is chosen from, by the light that it would bring if nothing stood between. light_samples:
-    S, light samples at one eye vertex. splats: light paths are joined to the lens. roulette: paths end at
-    random, the dimmer the sooner, and those that go on make up for it; else all of them go on up to L and K. hits: eye
-    paths that meet a light count.
+    samples: iterations. time_limit: seconds, 0 for none. noise_threshold: the render stops once its noise, measured as
+    `vlp_bpt.noise` says, is as low as that, if `samples` and `time_limit` do not end it before; 0 for none.
+    light_path_length: L, most surface hits of a light path. eye_path_length: K, most surface hits of an eye path.
+    light_paths: N, light paths of one iteration (0: chosen from the picture's size). vlp_connections: C, virtual light
+    points joined to one eye vertex. vlp_candidates: M, how many each of them is chosen from, by the light that it would
+    bring if nothing stood between. light_samples: S, light samples at one eye vertex. splats: light paths are joined to
+    the lens. roulette: paths end at random, the dimmer the sooner, and those that go on make up for it; else all of
+    them go on up to L and K. hits: eye paths that meet a light count.
     clamp_direct, clamp_indirect: the most that one find of light after at most one surface, or after more, may add to
     a pixel (mean of its channels); 0: no limit. Clamping removes bright specks and the light in them: it is a bias.
     denoise: the finished picture is denoised by Open Image Denoise, guided by colours and normals that the eye paths
@@ -133,6 +135,7 @@ class RenderSettings:
     mode: Mode = Mode.BALANCED
     samples: int = 128
     time_limit: float = 0.0
+    noise_threshold: float = 0.0
     light_path_length: int | None = None
     eye_path_length: int | None = None
     light_paths: int | None = None

@@ -22,6 +22,7 @@ import addon
 import vlp_bpt
 from addon import figures, final
 from vlp_bpt.errors import DeviceError
+from vlp_bpt.render import Progress, Statistics
 
 
 @pytest.fixture(autouse=True)
@@ -207,6 +208,15 @@ def test_what_the_render_took_is_stamped_into_the_file(out: Path) -> None:
 @pytest.mark.parametrize("seconds, text", [(0, "00:00:00.00"), (59.999, "00:01:00.00"), (3723.456, "01:02:03.46")])
 def test_times_are_hours_minutes_seconds(seconds: float, text: str) -> None:
     assert figures.duration(seconds) == text
+
+
+def test_noise_is_shown_where_it_is_known() -> None:
+    taken = Statistics(64, 1.0, 0.1, 1000, 500, 42, 0, {}, noise=0.01234)
+    assert ("Noise", "0.012") in figures.lines(taken, 2.0, (0.0, 0.0), [])
+    assert "Noise 0.02 |" in figures.status(taken, Progress(32, 64, 0.5, 1.0, 1.0, True, noise=0.02))
+    taken = Statistics(64, 1.0, 0.1, 1000, 500, 42, 0, {})
+    assert "Noise" not in dict(figures.lines(taken, 2.0, (0.0, 0.0), []))
+    assert "Noise" not in figures.status(taken, Progress(32, 64, 0.5, 1.0, 1.0, True))
 
 
 @pytest.mark.parametrize("persistent", [False, True])

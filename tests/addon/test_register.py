@@ -64,6 +64,7 @@ def test_each_setting_is_exported() -> None:
     values: dict[str, Any] = {
         "samples": 7,
         "time_limit": 12.5,
+        "noise_threshold": 0.015,
         "light_path_length": 4,
         "eye_path_length": 5,
         "light_paths": 600,

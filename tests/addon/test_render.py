@@ -240,6 +240,28 @@ def test_a_border_is_a_part_of_the_whole(tmp_path: Path) -> None:
     assert (noise < 0.01 * same[..., :3].mean()).all()
 
 
+def test_a_noise_threshold(tmp_path: Path) -> None:
+    from addon import figures
+
+    floor()
+    scenes.light("POINT")
+    scene = bpy.context.scene
+    scene.vlp_bpt.samples, scene.vlp_bpt.noise_threshold = 10**6, 0.02
+    scene.view_layers.new("second")
+    scene.render.engine = "VLP_BPT"
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.filepath = str(tmp_path / "x.exr")
+    bpy.ops.render.render(write_still=True)
+    image = OpenImageIO.ImageInput.open(str(tmp_path / "x.exr"))
+    stamps = {attribute.name: attribute.value for attribute in image.spec().extra_attribs}
+    image.close()
+    for layer in ("ViewLayer", "second"):
+        shown = dict(figures.last[("Scene", layer)])
+        assert 32 <= int(shown["Iterations"].replace(",", "")) < 10**5
+        assert 0 < float(shown["Noise"]) <= 0.02
+        assert float(stamps[f"VLP_BPT.{layer}.noise"]) == pytest.approx(float(shown["Noise"]), rel=0.06)
+
+
 def test_a_time_limit(tmp_path: Path) -> None:
     from addon import figures
 

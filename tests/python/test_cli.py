@@ -111,6 +111,23 @@ def test_the_time_limit(folder: Path) -> None:
     assert 0.2 < metadata["seconds"] < 5
 
 
+def test_the_noise_threshold(folder: Path) -> None:
+    result = vlp_bpt(folder, "render", "room.vlp.npz", "-o", "a.exr", "--samples", "100000", "--noise", "0.05")
+    metadata = read_image(folder / "a.exr").metadata
+    assert 32 <= metadata["iterations"] < 100000
+    assert metadata["noise"] <= metadata["settings"]["noise_threshold"] == 0.05
+    assert f"noise {metadata['noise']:.2g}" in result.stdout
+
+
+def test_a_range_has_its_iterations_whatever_the_noise_threshold_of_the_scene(folder: Path) -> None:
+    settings = RenderSettings(mode=Mode.PAPER, noise_threshold=100.0)
+    save_snapshot(folder / "soon.vlp.npz", Snapshot(room(24, 16), settings))
+    vlp_bpt(folder, "render", "soon.vlp.npz", "-o", "whole.exr", "--samples", "100")
+    assert read_image(folder / "whole.exr").metadata["iterations"] == 32
+    vlp_bpt(folder, "render", "soon.vlp.npz", "-o", "part.exr", "--iterations", "5:45")
+    assert read_image(folder / "part.exr").metadata["ranges"] == [[5, 45]]
+
+
 def test_ranges_merge_bit_for_bit(folder: Path) -> None:
     vlp_bpt(folder, "render", "room.vlp.npz", "-o", "whole.exr", "--samples", "9")
     vlp_bpt(folder, "render", "room.vlp.npz", "-o", "a.exr", "--iterations", "0:4")
@@ -182,6 +199,10 @@ RENDER = ("render", "room.vlp.npz", "-o", "a.exr")
         ((*RENDER, "--set", "mode=FAST"), "mode = 'FAST': must be one of PAPER, BALANCED, REFERENCE"),
         ((*RENDER, "--samples", "0"), "samples = 0: must be from 1 to 2147483647"),
         ((*RENDER, "--time", "soon"), "time_limit = 'soon': must be a number"),
+        ((*RENDER, "--noise", "low"), "noise_threshold = 'low': must be a number"),
+        ((*RENDER, "--noise", "-0.1"), "noise_threshold = -0.1: must be from 0 to 1000000000"),
+        ((*RENDER, "--iterations", "0:5", "--noise", "0.1"), "leave the noise threshold out"),
+        (("render", "room.vlp.npz", "--debug-strategies", "x", "--noise", "0.1"), "leave --noise out"),
         ((*RENDER, "--device", "GPU"), "device = 'GPU': must be one of AUTO, CPU, CUDA, HYBRID"),
         ((*RENDER, "--frame", "3"), "--frame is for .blend files: a snapshot holds one frame"),
         ((*RENDER, "--iterations", "5"), "--iterations 5: must be A:B, two whole numbers"),
@@ -248,6 +269,14 @@ def test_interrupting_before_the_first_picture_leaves_none(folder: Path) -> None
     assert terminal.process.returncode == 130
     assert terminal.shown.rstrip().endswith(b"vlp-bpt: interrupted")
     assert not (folder / "a.exr").exists()
+
+
+def test_progress_tells_the_noise(folder: Path) -> None:
+    noise = ("--noise", "1e-5", "--time", "1.5")
+    terminal = OnTerminal(folder, "render", "room.vlp.npz", "-o", "a.exr", "--samples", "100000", *noise)
+    terminal.read_until(None)
+    terminal.process.communicate(timeout=20)
+    assert re.search(rb"/100000 iterations, [^\r]* noise 0\.\d+", terminal.shown)
 
 
 def test_missing_light_is_told(folder: Path) -> None:

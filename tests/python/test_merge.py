@@ -46,6 +46,16 @@ def test_merged_files_merge_again(tmp_path: Path) -> None:
     assert np.array_equal(merge_images([b, tmp_path / "outer.exr"]).pixels, whole.pixels)
 
 
+def test_parts_that_stop_by_their_noise_merge(tmp_path: Path) -> None:
+    a = part(tmp_path / "a.exr", 0, 500, noise_threshold=0.04)
+    first = read_image(a).metadata
+    b = part(tmp_path / "b.exr", 500, 510)
+    merged = merge_images([a, b])
+    assert merged.metadata["ranges"] == [[0, first["iterations"]], [500, 510]]
+    assert "noise" in first
+    assert "noise" not in merged.metadata  # that of a part alone
+
+
 def test_a_window_merges(tmp_path: Path) -> None:
     scene = room()
     scene.film.window = (2, 3, 5, 4)

@@ -156,7 +156,7 @@ def test_native_settings_may_not_lack_one() -> None:
     scene.set_film(4, 3, 0, 0, 4, 3, False)
     scene.build(1)
     options = settings().resolved(4, 3).to_dict() | {"iteration_begin": 0}
-    for name in set(options) - {"mode", "samples", "time_limit", "denoise_prefilter"}:
+    for name in set(options) - {"mode", "samples", "time_limit", "noise_threshold", "denoise_prefilter"}:
         with pytest.raises((ValueError, TypeError, RuntimeError), match=name):
             _native.Renderer(scene, {k: v for k, v in options.items() if k != name})
 
