@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._worker import run_aside
 from .errors import Cancelled, DeviceError
 
 _NAMES = {
@@ -25,7 +26,6 @@ _NAMES = {
 }
 _CPU, _FLOAT3, _CANCELLED = 1, 3, 6  # of OIDNDeviceType, OIDNFormat, OIDNError
 _LEAST_SIDE = 32  # pixels: smaller pictures are mirrored up to it, as the network makes up what is beyond their edges
-_POLL_SECONDS = 0.05
 _SAID_CANCELLED = "denoising was cancelled"
 
 _Monitor = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_double)
@@ -62,31 +62,18 @@ def denoise(
     if cancelled is not None and cancelled():
         raise Cancelled(_SAID_CANCELLED)
     stop = threading.Event()
-    outcome: list[_Float32 | BaseException] = []
 
-    def work() -> None:
-        try:
-            with _Device(library, threads, stop) as device:
-                for name in guides if prefilter else ():
-                    images[name] = device.run({name: images[name]})
-                outcome.append(device.run(images, hdr=True, cleanAux=prefilter and bool(guides)))
-        except BaseException as error:  # handed to the caller's thread
-            outcome.append(error)
+    def work() -> _Float32:
+        with _Device(library, threads, stop) as device:
+            for name in guides if prefilter else ():
+                images[name] = device.run({name: images[name]})
+            return device.run(images, hdr=True, cleanAux=prefilter and bool(guides))
 
-    # In a thread of its own: the caller's stays free for Ctrl+C and for whoever asks to stop.
-    worker = threading.Thread(target=work, name="vlp-bpt denoiser", daemon=True)
-    worker.start()
-    try:
-        while worker.is_alive():
-            if cancelled is not None and cancelled():
-                stop.set()
-            worker.join(_POLL_SECONDS)
-    finally:
-        stop.set()
-        worker.join()
-    result = outcome[0]
-    if isinstance(result, BaseException):
-        raise result
+    def ask() -> None:
+        if cancelled is not None and cancelled():
+            stop.set()
+
+    result = run_aside(work, name="vlp-bpt denoiser", poll=ask, stop=stop.set)
     (above, _), (left, _) = _margins((height, width))
     return np.concatenate([result[above : above + height, left : left + width], pixels[..., 3:]], axis=2)
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import denoise
+from ._worker import run_aside
 from .changes import changes, kept
 from .errors import Cancelled, DeviceError, Error, SceneError
 from .images import ALBEDO, NOISY, NORMAL, Image
@@ -23,7 +24,6 @@ from .settings import RenderSettings
 from .upload import upload, upload_changes
 from .validation import validate
 
-_POLL_SECONDS = 0.05  # how often a running pass is asked about: cancelling takes no longer than this
 _REPORT_SECONDS = 0.2  # most time between two reports of progress, as far as iterations are that short
 
 
@@ -338,37 +338,22 @@ class Renderer:
         return images
 
     def _iterate(self, count: int, poll: Callable[[], bool] | None) -> int:
-        outcome: list[int | BaseException] = []
+        def work() -> int:
+            with native_errors():
+                return int(self._native.iterate(count))
 
-        def work() -> None:
-            try:
-                outcome.append(int(self._native.iterate(count)))
-            except BaseException as error:  # handed to the caller's thread
-                outcome.append(error)
+        def ask() -> None:
+            if poll is not None and poll():
+                self._stop.set()
+            if self._stop.is_set():
+                self._native.cancel()  # again each time: it may have come before the pass began
 
         with self._lock:
             started = time.perf_counter()
-            worker = threading.Thread(target=work, name="vlp-bpt", daemon=True)
-            worker.start()
             try:
-                while True:
-                    worker.join(_POLL_SECONDS)
-                    if not worker.is_alive():
-                        break
-                    if poll is not None and poll():
-                        self._stop.set()
-                    if self._stop.is_set():
-                        self._native.cancel()  # again each time: it may have come before the pass began
+                return run_aside(work, name="vlp-bpt", poll=ask, stop=self._native.cancel)
             finally:
-                while worker.is_alive():
-                    self._native.cancel()
-                    worker.join(_POLL_SECONDS)
                 self._seconds += time.perf_counter() - started
-        result = outcome[0]
-        if isinstance(result, BaseException):
-            with native_errors():
-                raise result
-        return result
 
 
 class _Session:
