@@ -5,8 +5,8 @@
 
 namespace vlp {
 
-// The budget: this many cuts, and one more for so many refs.
-inline constexpr uint32_t k_free_splits = 100000, k_refs_per_split = 4;
+// The budget: this many cuts, and one more for so many refs. Large meshes stay near the memory that they take without.
+inline constexpr uint32_t k_free_splits = 65536, k_refs_per_split = 24;
 
 // Adds refs of parts of triangles, within the budget, and narrows the first part's ref. The result depends on the refs
 // alone, not on the number of threads (after Karras & Aila 2013, section 4.4).
