@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -28,3 +29,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if "slow" in item.keywords:
             item.add_marker(skip)
+
+
+@pytest.fixture
+def no_denoiser(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A machine without Open Image Denoise."""
+    from vlp_bpt import denoise
+
+    monkeypatch.setattr(denoise, "_candidates", lambda: iter(()))
+    denoise.load.cache_clear()
+    yield
+    denoise.load.cache_clear()

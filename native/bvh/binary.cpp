@@ -22,12 +22,6 @@ uint32_t bins_for(uint32_t refs) { return refs < 32 ? 8 : refs < 1024 ? 16 : k_m
 // Three floats and a zero in one register.
 using Float4 = float __attribute__((vector_size(16)));
 
-Float4 load(const Vec3& three_of_four) {
-    Float4 r;
-    std::memcpy(&r, &three_of_four, sizeof r);
-    r[3] = 0;  // an index, which as a number would be denormal, and slow
-    return r;
-}
 Float4 min4(Float4 a, Float4 b) { return a < b ? a : b; }
 Float4 max4(Float4 a, Float4 b) { return a > b ? a : b; }
 Vec3 to_vec3(Float4 v) { return {v[0], v[1], v[2]}; }
@@ -46,11 +40,18 @@ struct Bounds {
 
 constexpr Bounds k_nothing{{k_infinity, k_infinity, k_infinity, 0}, {-k_infinity, -k_infinity, -k_infinity, 0}};
 
-// A ref's corners, and its centre (from the middle, so that sums of large corners stay finite).
+// A ref's corners and its centre.
 struct RefBounds {
     Float4 low, high, center;
 
-    explicit RefBounds(const Ref& ref) : low(load(ref.low)), high(load(ref.high)), center((low + high) * 0.5f) {}
+    explicit RefBounds(const Ref& ref) {
+        static_assert(sizeof(Ref) == 2 * sizeof(Float4));
+        Float4 rows[2];
+        std::memcpy(rows, &ref, sizeof rows);
+        low = rows[0], high = rows[1];
+        low[3] = high[3] = 0;  // indices, which as numbers would be denormal, and slow
+        center = (low + high) * 0.5f;
+    }
 };
 
 // Refs [begin, end) and their bounds.
@@ -115,7 +116,7 @@ struct Split {
     uint32_t bin = 0;         // first bin of the right side
 };
 
-float blocks(uint32_t refs) { return static_cast<float>((refs + k_block_width - 1) / k_block_width); }
+float blocks(uint32_t refs) { return static_cast<float>(blocks_for(refs)); }
 
 Split best_split(const Bins& bins, const Binning& binning) {
     Split best;

@@ -18,6 +18,17 @@ struct LeafSource {
     std::span<const GeometryView> geometries;
     std::span<const InstanceView> instances;
     const GeometryView* geometry = nullptr;
+
+    const GeometryView& geometry_of(const Ref& ref) const {
+        return geometry ? *geometry : geometries[instances[ref.instance].geometry];
+    }
+    // Null: the primitive stands where its geometry has it.
+    const InstanceView* placement_of(const Ref& ref) const {
+        return ref.instance == k_none ? nullptr : &instances[ref.instance];
+    }
+    Corners corners_of(const Ref& ref) const {
+        return vlp::corners_of(geometry_of(ref), placement_of(ref), ref.primitive);
+    }
 };
 
 // `rule`: by the cheapest plan; null: opens the child with the most refs first, which bounds the depth.

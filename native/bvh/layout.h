@@ -30,6 +30,8 @@ struct alignas(64) BvhNode {
     uint32_t child[k_node_width];
 };
 
+constexpr uint32_t blocks_for(uint32_t primitives) { return (primitives + k_block_width - 1) / k_block_width; }
+
 // Absent triangles have NaN vertices, which no ray meets. In a tree of its own geometry `instance` is k_none.
 struct alignas(16) TriangleBlock {
     float vertex[3][3][k_block_width];  // vertex, axis

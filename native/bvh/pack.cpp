@@ -27,14 +27,8 @@ void set_lane(SphereBlock& block, uint32_t lane, const Sphere& sphere, const Ref
 uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree& out) {
     const Ref& first = refs.front();
     if (first.primitive == k_none) return make_child(ChildKind::instance, first.instance);
-    const auto geometry_of = [&](const Ref& ref) -> const GeometryView& {
-        return source.geometry ? *source.geometry : source.geometries[source.instances[ref.instance].geometry];
-    };
-    const auto placement_of = [&](const Ref& ref) {
-        return ref.instance == k_none ? nullptr : &source.instances[ref.instance];
-    };
-    const auto blocks = static_cast<uint32_t>((refs.size() + k_block_width - 1) / k_block_width);
-    if (geometry_of(first).kind == GeometryKind::mesh) {
+    const uint32_t blocks = blocks_for(static_cast<uint32_t>(refs.size()));
+    if (source.geometry_of(first).kind == GeometryKind::mesh) {
         const auto index = static_cast<uint32_t>(out.triangle_blocks.size());
         out.triangle_blocks.resize(index + blocks);
         for (uint32_t i = 0; i < blocks * k_block_width; ++i) {
@@ -44,7 +38,7 @@ uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree
                 set_lane(block, i % k_block_width, none, Ref{{}, k_none, {}, k_none});
             } else {
                 const Ref& ref = refs[i];
-                set_lane(block, i % k_block_width, corners_of(geometry_of(ref), placement_of(ref), ref.primitive), ref);
+                set_lane(block, i % k_block_width, source.corners_of(ref), ref);
             }
         }
         return make_child(ChildKind::triangles, index, blocks);
@@ -57,7 +51,8 @@ uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree
             set_lane(block, i % k_block_width, Sphere{{}, k_nan}, Ref{{}, k_none, {}, k_none});
         } else {
             const Ref& ref = refs[i];
-            set_lane(block, i % k_block_width, sphere_of(geometry_of(ref), placement_of(ref), ref.primitive), ref);
+            set_lane(block, i % k_block_width,
+                     sphere_of(source.geometry_of(ref), source.placement_of(ref), ref.primitive), ref);
         }
     }
     return make_child(ChildKind::spheres, index, blocks);

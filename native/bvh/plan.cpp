@@ -12,7 +12,7 @@ constexpr uint8_t k_mixed = 255;      // not of one kind, or instances, which st
 // Bounded, so that sums of costs stay finite.
 float area_of(const Box& box) { return min_of(box.half_area(), 0x1p90f); }
 
-float blocks(uint32_t refs) { return static_cast<float>((refs + k_block_width - 1) / k_block_width); }
+float blocks(uint32_t refs) { return static_cast<float>(blocks_for(refs)); }
 
 }  // namespace
 

@@ -57,6 +57,8 @@ private:
     float cell_;
 };
 
+bool is_empty(const Box& b) { return b.low.x > b.high.x || b.low.y > b.high.y || b.low.z > b.high.z; }
+
 Box intersection(const Box& a, const Box& b) { return {max_of(a.low, b.low), min_of(a.high, b.high)}; }
 
 // The two parts of the triangle in `box`, on either side of the plane; a little wider than rounding moves the cut.
@@ -86,13 +88,14 @@ float waste_of(const Corners& c, const Box& box) {
 
 class Splitter {
 public:
-    Splitter(std::vector<Ref>& refs, const LeafSource& source, ThreadPool& pool)
+    // `scene`: around all refs.
+    Splitter(std::vector<Ref>& refs, const Box& scene, const LeafSource& source, ThreadPool& pool)
         : refs_(refs),
           source_(source),
           pool_(pool),
           chunks_((size() + k_chunk - 1) / k_chunk),
-          halving_(bounds()),
-          tolerated_waste_(k_tolerated_waste * bounds().half_area() / static_cast<float>(size())) {}
+          halving_(scene),
+          tolerated_waste_(k_tolerated_waste * scene.half_area() / static_cast<float>(size())) {}
 
     void split() {
         if (!halving_.is_possible()) return;
@@ -103,7 +106,7 @@ public:
         std::vector<std::vector<Ref>> added(chunks_);
         for_chunks([&](uint32_t chunk, uint32_t i) {
             const uint32_t splits = splits_of(priority[i], factor);
-            if (splits > 0) split(refs_[i], splits, corners(refs_[i]), added[chunk]);
+            if (splits > 0) split(refs_[i], splits, source_.corners_of(refs_[i]), added[chunk]);
         });
         for (const auto& parts : added) refs_.insert(refs_.end(), parts.begin(), parts.end());
     }
@@ -120,27 +123,12 @@ private:
         });
     }
 
-    Box bounds() const {
-        Box box;
-        for (const Ref& ref : refs_) box.include(ref.box());
-        return box;
-    }
-
-    const GeometryView& geometry_of(const Ref& ref) const {
-        return source_.geometry ? *source_.geometry : source_.geometries[source_.instances[ref.instance].geometry];
-    }
-
-    Corners corners(const Ref& ref) const {
-        return corners_of(geometry_of(ref), ref.instance == k_none ? nullptr : &source_.instances[ref.instance],
-                          ref.primitive);
-    }
-
     // How much a cut promises: 0 for what cannot be cut.
     float priority_of(const Ref& ref) const {
-        if (ref.primitive == k_none || geometry_of(ref).kind != GeometryKind::mesh) return 0;
+        if (ref.primitive == k_none || source_.geometry_of(ref).kind != GeometryKind::mesh) return 0;
         const Plane plane = halving_.plane_of(ref.box());
         if (plane.axis == k_none) return 0;
-        const float waste = waste_of(corners(ref), ref.box()) - tolerated_waste_;
+        const float waste = waste_of(source_.corners_of(ref), ref.box()) - tolerated_waste_;
         return waste > 0 && waste < k_infinity ? std::cbrt(std::ldexp(waste, -static_cast<int>(plane.level))) : 0.0f;
     }
 
@@ -176,6 +164,11 @@ private:
         if (plane.axis == k_none) return;
         Box part[2];
         cut(triangle, ref.box(), plane, part);
+        for (const uint32_t side : {0u, 1u}) {
+            if (!is_empty(part[side])) continue;  // after earlier cuts the triangle may lie on the other side alone
+            ref.low = part[1 - side].low, ref.high = part[1 - side].high;
+            return split(ref, splits - 1, triangle, added);
+        }
         const float longest[2] = {longest_side(part[0]), longest_side(part[1])};
         const float share = longest[0] / (longest[0] + longest[1]);
         if (!(share >= 0 && share <= 1)) return;
@@ -203,7 +196,9 @@ private:
 }  // namespace
 
 void presplit(std::vector<Ref>& refs, const LeafSource& source, ThreadPool& pool) {
-    if (!refs.empty()) Splitter(refs, source, pool).split();
+    Box scene;
+    for (const Ref& ref : refs) scene.include(ref.box());
+    if (!refs.empty()) Splitter(refs, scene, source, pool).split();
 }
 
 }  // namespace vlp

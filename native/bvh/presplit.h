@@ -9,7 +9,7 @@ namespace vlp {
 inline constexpr uint32_t k_free_splits = 65536, k_refs_per_split = 24;
 
 // Adds refs of parts of triangles, within the budget, and narrows the first part's ref. The result depends on the refs
-// alone, not on the number of threads (after Karras & Aila 2013, section 4.4).
+// alone, not on the number of threads (after Karras & Aila 2013).
 void presplit(std::vector<Ref>& refs, const LeafSource& source, ThreadPool& pool);
 
 }  // namespace vlp

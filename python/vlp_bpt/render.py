@@ -138,6 +138,7 @@ class Renderer:
             self._known = kept(new_scene)
             self._warnings, self.film = warnings, new_scene.film
             self._asked, self.settings = asked, new_settings
+            self._noise = NoiseMeter(new_settings.noise_threshold)
             if same_devices:
                 self._native.update(self._scene, self._options())
             else:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,14 +29,6 @@ def floor() -> None:
     scenes.light("AREA", energy=50)
     settings = bpy.context.scene.vlp_bpt
     settings.samples, settings.denoise, settings.denoise_prefilter = 4, True, False
-
-
-@pytest.fixture
-def missing(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(denoise, "_candidates", lambda: iter(()))
-    denoise.load.cache_clear()
-    yield
-    denoise.load.cache_clear()
 
 
 @pytest.fixture
@@ -137,7 +128,7 @@ def test_a_transparent_film_keeps_its_alpha(tmp_path: Path) -> None:
 
 
 def test_without_the_library_the_picture_stays_noisy_with_a_warning(
-    tmp_path: Path, missing: None, reports: list[str]
+    tmp_path: Path, no_denoiser: None, reports: list[str]
 ) -> None:
     image = render(tmp_path / "a.exr")
     assert len(reports) == 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from vlp_bpt.snapshot import Snapshot, save_snapshot
 from vlp_bpt.upload import upload
 
 
-def built(scene: Scene):  # type: ignore[no-untyped-def]
+def built(scene: Scene) -> Any:
     native_scene = load_native().Scene()
     upload(scene, native_scene)
     native_scene.build(1)

@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from fake_native import FakeRenderer, module
 from numpy.typing import NDArray
 from scenes_for_tests import assert_same_mean, blocks
 from small_scenes import room
 from stats import mean_p, sidak
 from test_denoise import FAST
 
-from vlp_bpt import Renderer, RenderSettings, Scene, materials, render
+from vlp_bpt import Renderer, RenderSettings, Scene, materials
 from vlp_bpt.noise import NoiseMeter, luminance_of, picture_noise
 from vlp_bpt.render import Progress
 from vlp_bpt.scene import Instance, Spheres
 
 MANY = 10**6
-
-
-@pytest.fixture
-def fake(monkeypatch: pytest.MonkeyPatch) -> Iterator[type[FakeRenderer]]:
-    native = module()
-    monkeypatch.setattr(render, "load_native", lambda: native)
-    yield FakeRenderer
-    FakeRenderer.seconds, FakeRenderer.fails = 0.0, None
 
 
 def make(threshold: float, scene: Scene | None = None, samples: int = MANY, **settings: Any) -> Renderer:

@@ -6,27 +6,17 @@ import _thread
 import itertools
 import threading
 import time
-from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import pytest
-from fake_native import FakeRenderer, module
 from small_scenes import everything, room
 
 import vlp_bpt
-from vlp_bpt import Cancelled, DeviceError, Mode, Renderer, RenderSettings, SceneError, SettingsError, render
+from vlp_bpt import Cancelled, DeviceError, Mode, Renderer, RenderSettings, SceneError, SettingsError
 from vlp_bpt.render import Progress
 from vlp_bpt.scene import Mesh, Scene
-
-
-@pytest.fixture
-def fake(monkeypatch: pytest.MonkeyPatch) -> Iterator[type[FakeRenderer]]:
-    native = module()
-    monkeypatch.setattr(render, "load_native", lambda: native)
-    yield FakeRenderer
-    FakeRenderer.seconds, FakeRenderer.fails = 0.0, None
 
 
 def make(samples: int = 10, scene: Scene | None = None, first: int = 0, **settings: Any) -> Renderer:

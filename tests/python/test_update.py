@@ -137,3 +137,18 @@ def test_after_an_error_within_everything_is_made_anew(monkeypatch: pytest.Monke
     renderer.update(scene)
     assert renderer._scene is not native_scene
     np.testing.assert_array_equal(renderer.render().pixels, Renderer(scene, SETTINGS).render().pixels)
+
+
+def test_the_noise_threshold_is_that_of_the_new_settings() -> None:
+    renderer = Renderer(room(), replace(SETTINGS, samples=40))
+    renderer.render()
+    assert renderer.statistics.noise is None
+    renderer.update(settings=replace(SETTINGS, samples=100_000, noise_threshold=0.3))
+    renderer.render()
+    assert renderer.iterations < 100_000
+    noise = renderer.statistics.noise
+    assert noise is not None and noise <= 0.3
+    renderer.update(settings=replace(SETTINGS, samples=40))
+    renderer.render()
+    assert renderer.iterations == 40
+    assert renderer.statistics.noise is None
