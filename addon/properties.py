@@ -80,6 +80,7 @@ _DEFAULTS = {
     "light_samples": 1,
     "splats": True,
     "roulette": True,
+    "adaptive": True,
     "weighting": "BALANCE",
 } | preset("BALANCED")
 
@@ -122,6 +123,12 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
         soft_max=1.0,
         step=1,
         precision=4,
+    )
+    adaptive: bpy.props.BoolProperty(
+        name="Adaptive Sampling",
+        description="Spend more samples where the picture is noisy and fewer where it is clean. The picture stays "
+        "right, and the number of samples is that of a pixel on average",
+        default=_DEFAULTS["adaptive"],
     )
     light_path_length: bpy.props.IntProperty(
         name="Light Bounces",

@@ -38,6 +38,7 @@ class VLP_BPT_PT_sampling(_RenderPanel, bpy.types.Panel):
         column.prop(settings, "samples")
         column.prop(settings, "time_limit")
         column.prop(settings, "noise_threshold")
+        column.prop(settings, "adaptive")
         column.prop(settings, "seed")
         column.separator()
         column.prop(settings, "denoise")

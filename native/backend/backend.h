@@ -18,6 +18,7 @@ struct BackendCounters {
     std::atomic<uint32_t> work_done{0}, work_total{1};  // pieces of the iteration under way
     std::atomic<uint32_t> stored_vlps{0};               // V of the last light pass
     std::atomic<uint64_t> dropped{0};                   // estimates that were not finite, left out
+    std::atomic<uint64_t> eye_samples{0};               // of complete iterations
     std::atomic<uint64_t> uploaded{0};                  // bytes of scenes that were copied to the device
 };
 

@@ -69,6 +69,7 @@ public:
 
     void update(const Scene& scene, const PassSettings& pass) override {
         counters.dropped = 0;
+        counters.eye_samples = 0;
         scene_ = scene.view();
         pass_ = pass;
         const size_t capacity = pass.kappa > 0 ? light_vertex_capacity(pass) : 0;
@@ -79,6 +80,8 @@ public:
         vertices_in_piece_ = std::vector<uint32_t>(piece_count(pass));
         stored_in_piece_ = std::vector<uint32_t>(piece_count(pass) + 1);
         tiles_ = tiles_in_morton_order(scene.window());
+        plan_ = SamplePlan(scene.window());
+        moments_ = std::vector<PixelMoments>(pass.adaptive ? scene.window().pixel_count() : 0);
     }
 
     bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
@@ -86,6 +89,8 @@ public:
         counters.work_done = 0;
         counters.work_total = pieces + static_cast<uint32_t>(tiles_.size());
         for_rows(film, [&](uint32_t begin, uint32_t end) { film.clear_splats(begin, end); });
+        if (pass_.adaptive && plan_.due()) plan_samples();
+        const SampleRates rates = plan_.rates(iteration, plan_.levels().data(), moments_.data());
 
         LightVertexCache cache;
         if (pieces > 0) {
@@ -97,18 +102,23 @@ public:
 
         pool_.run(static_cast<uint32_t>(tiles_.size()), [&](uint32_t i) {
             if (stop) return;
-            run_tile(iteration, film, cache, tiles_[i]);
+            run_tile(rates, film, cache, tiles_[i]);
             counters.work_done.fetch_add(1, std::memory_order_relaxed);
         });
         if (stop) return false;
-        for_rows(film, [&](uint32_t begin, uint32_t end) { film.commit_rows(begin, end); });
+        for_rows(film, [&](uint32_t begin, uint32_t end) {
+            film.commit_rows(begin, end);
+            if (pass_.adaptive) add_moments(rates, film, begin, end);
+        });
         film.count_iteration();
+        counters.eye_samples += plan_.finish_iteration();
         return true;
     }
 
     void add_memory(MemoryByDevice& memory) const override {
         MemoryUse& cpu = memory["CPU"];
         cpu.light_vertices += stored_.capacity() * (sizeof(LightVertex) + sizeof(uint32_t));
+        cpu.film += moments_.size() * (sizeof(PixelMoments) + sizeof(int8_t));
         cpu.work += (vertices_in_piece_.capacity() + stored_in_piece_.capacity()) * sizeof(uint32_t) +
                     tiles_.capacity() * sizeof(Tile);
     }
@@ -159,28 +169,40 @@ private:
         return {slots_.get(), stored_.data(), stored_in_piece_.back()};
     }
 
-    void run_tile(uint32_t iteration, Film& film, const LightVertexCache& cache, Tile tile) {
+    void run_tile(const SampleRates& rates, Film& film, const LightVertexCache& cache, Tile tile) {
         const Window& window = film.window();
         const uint32_t x_end = std::min((tile.x + 1) * k_tile, window.width);
         const uint32_t y_end = std::min((tile.y + 1) * k_tile, window.height);
         uint64_t dropped = 0;
         for (uint32_t y = tile.y * k_tile; y < y_end; ++y) {
             for (uint32_t x = tile.x * k_tile; x < x_end; ++x) {
-                const size_t i = static_cast<size_t>(y) * window.width + x;
-                const uint32_t px = window.x + x, py = window.y + y;
-                PixelSample& pixel = film.frame()[i];
-                if (film.has_guides()) {
-                    GuideSample& guide = film.guide_frame()[i];
-                    dropped += trace_guided_pixel(scene_, pass_, cache, iteration, px, py, pixel, guide);
-                    continue;
-                }
-                PixelSink sink{pass_};
-                const float alpha = trace_eye_path(scene_, pass_, cache, iteration, px, py, sink);
-                dropped += sink.dropped;
-                pixel = {{sink.radiance.r, sink.radiance.g, sink.radiance.b, alpha}};
+                const uint32_t i = y * window.width + x, px = window.x + x, py = window.y + y;
+                const PixelTurn turn = turn_of(rates, i);
+                if (turn.samples == 0) continue;
+                const PixelResult result = film.has_guides()
+                                               ? trace_guided_pixel(scene_, pass_, cache, turn, px, py)
+                                               : trace_pixel<PixelSink>(scene_, pass_, cache, turn, px, py);
+                film.frame()[i] = result.found;
+                if (film.has_guides()) film.guide_frame()[i] = result.guide;
+                dropped += result.dropped;
             }
         }
         count_dropped(dropped);
+    }
+
+    void add_moments(const SampleRates& rates, Film& film, uint32_t row_begin, uint32_t row_end) {
+        const uint32_t width = film.window().width;
+        for (uint32_t i = row_begin * width; i < row_end * width; ++i) {
+            const PixelTurn turn = turn_of(rates, i);
+            if (turn.samples > 0) moments_[i].add(film.frame()[i], turn.samples);
+        }
+    }
+
+    void plan_samples() {
+        std::vector<float> relative_variance(moments_.size());
+        std::transform(moments_.begin(), moments_.end(), relative_variance.begin(),
+                       [](const PixelMoments& m) { return m.relative_variance(); });
+        plan_.plan(relative_variance);
     }
 
     void count_dropped(uint64_t dropped) {
@@ -195,6 +217,8 @@ private:
     std::vector<uint32_t> vertices_in_piece_;
     std::vector<uint32_t> stored_in_piece_;  // first stored VLP of each piece, V last
     std::vector<Tile> tiles_;
+    SamplePlan plan_;
+    std::vector<PixelMoments> moments_;  // of the film's pixels, where sampling is adaptive
 };
 
 }  // namespace
@@ -205,6 +229,7 @@ std::unique_ptr<Backend> make_cpu_backend(const Scene& scene, const PassSettings
 
 void add_cpu_memory(MemoryByDevice& memory, Window window, const PassSettings& pass) {
     MemoryUse& cpu = memory["CPU"];
+    cpu.film += sample_plan_bytes(window, pass);
     if (pass.kappa > 0) cpu.light_vertices += light_vertex_capacity(pass) * (sizeof(LightVertex) + sizeof(uint32_t));
     cpu.work += (2 * size_t{piece_count(pass)} + 1) * sizeof(uint32_t) +
                 size_t{tiles_along(window.width)} * tiles_along(window.height) * sizeof(Tile);

@@ -52,6 +52,7 @@ public:
         kept_ = downloading_ = 0;
         splats_are_clear_ = false;
         counters.dropped = 0;
+        counters.eye_samples = 0;
         *counts_here_.data() = {};
         device_.clear(counts_.data(), counts_.bytes());
         place_scene(scene);
@@ -61,13 +62,16 @@ public:
 
     bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
         if (downloading_ > 0 && device_.is_over(downloaded_)) add_download(film);
+        if (pass_.adaptive && plan_.due()) plan_samples();
+        const SampleRates rates = plan_.rates(iteration, levels_.data(), moments_.data());
         counters.work_done = 0;
         counters.work_total = pixels() + (pass_.traces_light() ? pass_.light_paths : 0);
         if (pass_.traces_light() && !run_light_pass(iteration, stop)) return false;
         const bool has_vlps = pass_.kappa > 0;
-        const EyePass eye{scene_,         pass_,         iteration,     window_, has_vlps ? slots_.data() : nullptr,
-                          stored_.data(), frame_.data(), counts_.data()};
-        const bool went_on = pass_.guides ? launch_in_batches(pixels(), GuidedEyePass{eye, guides_.data()}, stop)
+        const EyePass eye{
+            scene_,         pass_,         rates,          window_,       has_vlps ? slots_.data() : nullptr,
+            stored_.data(), frame_.data(), guides_.data(), counts_.data()};
+        const bool went_on = pass_.guides ? launch_in_batches(pixels(), GuidedEyePass{eye}, stop)
                                           : launch_in_batches(pixels(), eye, stop);
         if (!went_on) return false;
         device_.download(Queue::passes, counts_here_.data(), counts_.data(), counts_.bytes());
@@ -76,8 +80,10 @@ public:
         device_.launch(0, channels * pixels(),
                        Commit{frame_.data(), guides_.data(), splats_.data(), point_splats_.data(), sums_.data(),
                               channels, kept_ == 0});
+        if (pass_.adaptive) device_.launch(0, pixels(), AddMoments{rates, frame_.data(), moments_.data()});
         splats_are_clear_ = true;
         ++kept_;
+        counters.eye_samples += plan_.finish_iteration();
         return true;
     }
 
@@ -110,11 +116,12 @@ public:
     void add_memory(MemoryByDevice& memory) const override {
         MemoryUse& gpu = memory[Device::k_name];
         for (size_t part = 0; part < parts_.of.size(); ++part) gpu.scene.of[part] = parts_.of[part].buffer.bytes();
-        gpu.film += frame_.bytes() + guides_.bytes() + splats_.bytes() + point_splats_.bytes() + sums_.bytes();
+        gpu.film += frame_.bytes() + guides_.bytes() + splats_.bytes() + point_splats_.bytes() + sums_.bytes() +
+                    moments_.bytes() + levels_.bytes() + variance_.bytes();
         gpu.light_vertices += slots_.bytes() + stored_.bytes();
         gpu.work += counts_.bytes() + end_of_path_.bytes() + vertices_in_path_.bytes() + scratch_.bytes();
         gpu.stacks = device_.stack_bytes();
-        memory["CPU"].film += sums_here_.bytes();
+        memory["CPU"].film += sums_here_.bytes() + variance_here_.bytes() + levels_.bytes();
         memory["CPU"].work += counts_here_.bytes();
     }
 
@@ -180,10 +187,24 @@ private:
         resize(sums_, pixels * film_channels(pass), "the film's sums");
         resize(splats_, pass.splats ? pixels * 3 : 0, "splats");
         resize(point_splats_, pass.splats && pass.guides ? pixels * 3 : 0, "splats");
-        if (sums_here_.size() != sums_.size()) {
-            sums_here_ = {};
-            sums_here_ = Buffer<ExactSum>(device_, sums_.size(), "the film's sums on the host", true);
-        }
+        resize(sums_here_, sums_.size(), "the film's sums on the host", true);
+        plan_ = SamplePlan(window);
+        const size_t planned = pass.adaptive ? pixels : 0;
+        resize(moments_, planned, "the noise of pixels");
+        resize(levels_, planned, "the samples of pixels");
+        resize(variance_, planned, "the noise of pixels");
+        resize(variance_here_, planned, "the noise of pixels on the host", true);
+        device_.clear(moments_.data(), moments_.bytes());
+    }
+
+    // Chooses levels from the moments of all iterations so far, which are waited for.
+    void plan_samples() {
+        device_.launch(0, pixels(), TellVariance{moments_.data(), variance_.data()});
+        device_.download(Queue::passes, variance_here_.data(), variance_.data(), variance_.bytes());
+        device_.record(finished_, Queue::passes);
+        device_.wait(finished_);
+        plan_.plan({variance_here_.data(), variance_here_.size()});
+        device_.upload(levels_.data(), plan_.levels().data(), levels_.bytes());
     }
 
     // Of as many light paths as there is room for: all, a half, a quarter, ...
@@ -207,10 +228,10 @@ private:
     }
 
     template <typename T>
-    void resize(Buffer<T>& old, size_t count, const char* what) {
+    void resize(Buffer<T>& old, size_t count, const char* what, bool on_host = false) {
         if (old.size() == count) return;
         old = {};  // first, to have its room
-        old = buffer<T>(count, what);
+        old = Buffer<T>(device_, count, what, on_host);
     }
 
     // For no path, so that the device reserves its stacks now and not in the middle of a render.
@@ -277,6 +298,10 @@ private:
     Buffer<GuideSample> guides_;
     Buffer<ExactSum> splats_, point_splats_, sums_, sums_here_;
     Buffer<PassCounts> counts_, counts_here_;  // "here": on the host
+    SamplePlan plan_;
+    Buffer<PixelMoments> moments_;  // this and the next: where sampling is adaptive
+    Buffer<int8_t> levels_;
+    Buffer<float> variance_, variance_here_;
     typename Device::Event finished_{device_}, downloaded_{device_};
     std::array<typename Device::Event, 2> batches_{typename Device::Event{device_}, typename Device::Event{device_}};
     uint32_t next_batch_ = 0;

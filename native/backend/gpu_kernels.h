@@ -1,9 +1,9 @@
 // What a GPU's threads do, each for one index: functions of plain data, which the host can run as well.
 #pragma once
 
+#include "backend/pixel.h"
 #include "core/atomic_add.h"
 #include "film/film.h"
-#include "integrator/guides.h"
 #include "integrator/light_tracing.h"
 
 namespace vlp {
@@ -57,41 +57,57 @@ struct ListStored {
     }
 };
 
-// Traces the eye path of pixel number `pixel` of the window. Without light vertices `slots` is null.
+// Traces the eye paths of pixel number `pixel` of the window. Without light vertices `slots` is null.
 struct EyePass {
     SceneView scene;
     PassSettings pass;
-    uint32_t iteration;
+    SampleRates rates;
     Window window;
     LightVertex* slots;
     const uint32_t* stored;
     PixelSample* frame;
+    GuideSample* guides;  // null without GuidedSink
     PassCounts* counts;
 
     template <typename Sink>
-    VLP_HD void trace(uint32_t pixel, Sink& sink, const PixelSink& found) const {
+    VLP_HD void trace(uint32_t pixel) const {
+        const PixelTurn turn = turn_of(rates, pixel);
+        if (turn.samples == 0) return;
         const uint32_t x = window.x + pixel % window.width, y = window.y + pixel / window.width;
         const LightVertexCache cache{slots, stored, slots ? static_cast<uint32_t>(counts->stored_vlps) : 0};
-        const float alpha = trace_eye_path(scene, pass, cache, iteration, x, y, sink);
-        if (found.dropped > 0) AtomicAdd{}(counts->dropped, found.dropped);
-        frame[pixel] = {{found.radiance.r, found.radiance.g, found.radiance.b, alpha}};
+        const PixelResult result = trace_pixel<Sink>(scene, pass, cache, turn, x, y);
+        if (result.dropped > 0) AtomicAdd{}(counts->dropped, result.dropped);
+        frame[pixel] = result.found;
+        if (guides) guides[pixel] = result.guide;
     }
-    VLP_HD void operator()(uint32_t pixel) const {
-        PixelSink sink{pass};
-        trace(pixel, sink, sink);
-    }
+    VLP_HD void operator()(uint32_t pixel) const { trace<PixelSink>(pixel); }
 };
 
 // The same with a denoiser's guides: a kernel of its own, so that the eye pass has no code for them.
 struct GuidedEyePass {
     EyePass eye;
-    GuideSample* guides;
+
+    VLP_HD void operator()(uint32_t pixel) const { eye.trace<GuidedSink>(pixel); }
+};
+
+// Adds what an iteration took to the moments of a pixel.
+struct AddMoments {
+    SampleRates rates;
+    const PixelSample* frame;
+    PixelMoments* moments;
 
     VLP_HD void operator()(uint32_t pixel) const {
-        GuidedSink sink(eye.pass, eye.scene);
-        eye.trace(pixel, sink, sink.pixel);
-        guides[pixel] = sink.guide();
+        const PixelTurn turn = turn_of(rates, pixel);
+        if (turn.samples > 0) moments[pixel].add(frame[pixel], turn.samples);
     }
+};
+
+// What the plan of a block is made of.
+struct TellVariance {
+    const PixelMoments* moments;
+    float* relative_variance;
+
+    VLP_HD void operator()(uint32_t pixel) const { relative_variance[pixel] = moments[pixel].relative_variance(); }
 };
 
 // Adds an iteration to the sums, one channel of a pixel at a time, as Film::commit_rows does, and clears its splats. `anew`:

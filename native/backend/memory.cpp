@@ -21,7 +21,11 @@ MemoryByDevice plan_memory(const std::string& device, const Scene& scene, const 
 void add_gpu_memory(MemoryByDevice& memory, const Scene& scene, const PassSettings& pass) {
     MemoryUse& gpu = memory["CUDA"];
     gpu.scene = scene.bytes(k_device_alignment);
-    gpu.film += film_bytes(scene.window(), pass);
+    gpu.film += film_bytes(scene.window(), pass) + sample_plan_bytes(scene.window(), pass);
+    if (pass.adaptive) {
+        gpu.film += scene.window().pixel_count() * sizeof(float);
+        memory["CPU"].film += scene.window().pixel_count() * (sizeof(float) + sizeof(int8_t));
+    }
     gpu.work += sizeof(PassCounts);
     if (pass.traces_light()) {
         gpu.light_vertices += light_vertex_capacity(pass) * (sizeof(LightVertex) + sizeof(uint32_t));

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "film/film.h"
+#include "film/sample_rates.h"
 #include "integrator/pass.h"
 #include "scene/scene.h"
 
@@ -44,6 +45,11 @@ inline size_t film_bytes(Window window, const PassSettings& pass) {
     const size_t samples = sizeof(PixelSample) + (pass.guides ? sizeof(GuideSample) : 0);
     const size_t splats = pass.splats ? (pass.guides ? 6 : 3) : 0;
     return window.pixel_count() * (samples + (splats + film_channels(pass)) * sizeof(ExactSum));
+}
+
+// What adaptive sampling keeps: moments and levels of the pixels.
+inline size_t sample_plan_bytes(Window window, const PassSettings& pass) {
+    return pass.adaptive ? window.pixel_count() * (sizeof(PixelMoments) + sizeof(int8_t)) : 0;
 }
 
 // Arrays of a scene begin at cache lines of a device.

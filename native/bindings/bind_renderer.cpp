@@ -58,6 +58,7 @@ PassSettings pass_of(const nb::dict& settings, bool transparent_film) {
     pass.clamp_indirect = get<float>(settings, "clamp_indirect");
     pass.transparent_film = transparent_film;
     pass.guides = get<bool>(settings, "denoise");
+    pass.adaptive = get<bool>(settings, "adaptive");
     pass.seed = get<uint32_t>(settings, "seed");
     pass.filter = filter_of(get<std::string>(settings, "filter"));
     pass.filter_width = get<float>(settings, "filter_width");
@@ -223,6 +224,7 @@ void bind_renderer(nb::module_& m) {
         .def_prop_ro("iterations", &Renderer::iteration_count)
         .def_prop_ro("vlps", [](const Renderer& r) { return r.stored_vlps(); })
         .def_prop_ro("dropped", [](const Renderer& r) { return r.dropped(); })
+        .def_prop_ro("eye_samples", [](const Renderer& r) { return r.eye_samples(); })
         .def_prop_ro("light_paths", &traced_light_paths)
         .def_prop_ro("paths",
                      [](const Renderer& r) {

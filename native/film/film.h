@@ -7,14 +7,10 @@
 
 #include "film/exact_sum.h"
 #include "film/guide.h"
+#include "film/pixel_sample.h"
 #include "film/window.h"
 
 namespace vlp {
-
-// What one iteration's eye path finds for a pixel: premultiplied radiance and alpha.
-struct PixelSample {
-    float rgba[4] = {0, 0, 0, 0};
-};
 
 class Film {
 public:
@@ -35,7 +31,7 @@ public:
     // Sums a pixel: red, green, blue and alpha; with guides then the colour to be denoised, 3, which has each splat in one
     // pixel, albedo, 3, and normal + 1, 3, as no sum may be negative.
     size_t channels() const { return has_guides() ? k_guided_channels : 4; }
-    // The iteration under way, row by row from the bottom; counts only once it is committed.
+    // The iteration under way, row by row from the bottom; counts only once it is committed. Stays afterwards.
     std::span<PixelSample> frame() { return frame_; }
     std::span<GuideSample> guide_frame() { return guide_frame_; }
     // What light paths add to its pixels, red, green and blue, in any order (see add_shared).

@@ -50,7 +50,7 @@ struct GuidedSink {
     bool open = true;  // nothing blurred so far
     bool sharp = false;  // the walk's last surface has sharp lobes alone
 
-    VLP_HD GuidedSink(const PassSettings& settings, const SceneView& view) : pixel{settings}, scene(view) {}
+    VLP_HD GuidedSink(const PassSettings& settings, const SceneView& view) : pixel(settings, view), scene(view) {}
 
     VLP_HD void add(const Contribution& c) {
         pixel.add(c);

@@ -29,6 +29,7 @@ struct PassSettings {
           clamp_indirect = 0;  // most that one find adds to a pixel (mean of its channels), 0: no limit
     bool transparent_film = false;   // the camera sees no background
     bool guides = false;             // gathers those of a denoiser, see guides.h
+    bool adaptive = false;           // samples go where there is noise, see film/sample_rates.h
     uint32_t seed = 0;
     float kappa = 0;  // C M N / V, V being what a pilot pass of the scene stored: how often a VLP is drawn
     Filter filter = Filter::blackman_harris;

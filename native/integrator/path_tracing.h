@@ -11,13 +11,20 @@ namespace vlp {
 // and a connection at each vertex, worth more than what ending it early saves.
 inline constexpr float k_spared_throughput = 2.0f / 3.0f;
 
+// The random numbers of a pixel's path: the number of a sequence, and which of it.
+struct EyeSample {
+    uint32_t sequence = 0;
+    uint32_t index = 0;
+};
+
 // The radiance that one path through pixel (x, y) of the full picture finds, y counted from the bottom. Each strategy's
 // share goes to sink.add(Contribution), each vertex of the walk to sink.visit(EyeWalk). Returns the pixel's alpha.
 template <typename Sink>
 VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& pass, const LightVertexCache& cache,
-                                   uint32_t iteration, uint32_t x, uint32_t y, Sink& sink) {
-    const uint32_t seed = hash(pass.seed, k_eye_stream, y * scene.camera.width + x);
-    Sampler sampler = make_sampler(seed, iteration);
+                                   EyeSample numbers, uint32_t x, uint32_t y, Sink& sink) {
+    uint32_t seed = hash(pass.seed, k_eye_stream, y * scene.camera.width + x);
+    if (numbers.sequence > 0) seed = hash(seed, numbers.sequence);
+    Sampler sampler = make_sampler(seed, numbers.index);
     const Vec2 center{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
     const Vec2 film = center + sample(pass.filter, pass.filter_width, scene.filter_tables, sampler.next_2d());
     Ray ray = sample_ray(scene.camera, film, scene.camera.aperture_radius > 0 ? sampler.next_2d() : Vec2{});
@@ -36,7 +43,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
     for (uint32_t hits = 1; hits <= pass.eye_path_length; ++hits) {
         const uint32_t first_draw = 2 + (hits - 1) * draws_per_step;
         const bool from_camera = eye.t == 1;
-        const uint32_t key = hash(seed ^ iteration, k_transparency_stream, hits);
+        const uint32_t key = hash(seed ^ numbers.index, k_transparency_stream, hits);
         const LightHits<Sink> lights{scene, pass, eye, ray.direction, pdf_solid_angle, sink};
         const Step step = walk(scene, ray, skip, from_camera, key, lights);
         if (!step.found) {
@@ -122,6 +129,8 @@ struct PixelSink {
     const PassSettings& pass;
     Rgb radiance{};
     uint32_t dropped = 0;
+
+    VLP_HD PixelSink(const PassSettings& settings, const SceneView&) : pass(settings) {}
 
     VLP_HD void add(const Contribution& c) {
         const Rgb weighted = c.value * c.weight;

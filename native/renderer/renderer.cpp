@@ -278,12 +278,15 @@ std::vector<std::string> Renderer::notes() const {
     return notes_;
 }
 
-uint64_t Renderer::dropped() const {
+uint64_t Renderer::sum_of(std::atomic<uint64_t> BackendCounters::* counter) const {
     const std::lock_guard lock(mutex_);
-    uint64_t sum = main_->counters.dropped;
-    if (instead_of_main_) sum += instead_of_main_->counters.dropped;
-    return helper_ ? sum + helper_->backend().counters.dropped : sum;
+    uint64_t sum = main_->counters.*counter;
+    if (instead_of_main_) sum += instead_of_main_->counters.*counter;
+    return helper_ ? sum + helper_->backend().counters.*counter : sum;
 }
+
+uint64_t Renderer::dropped() const { return sum_of(&BackendCounters::dropped); }
+uint64_t Renderer::eye_samples() const { return sum_of(&BackendCounters::eye_samples); }
 
 MemoryByDevice Renderer::memory() const {
     const std::lock_guard lock(mutex_);

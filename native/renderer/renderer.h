@@ -59,6 +59,7 @@ public:
     float progress() const;  // of the iteration under way, 0 to 1
     uint32_t stored_vlps() const { return active_.load()->counters.stored_vlps; }
     uint64_t dropped() const;  // estimates that were not finite
+    uint64_t eye_samples() const;  // of complete iterations
     const PassSettings& pass() const { return pass_; }
     const Scene& scene() const { return *scene_; }
     Film& film() { return film_; }
@@ -77,6 +78,7 @@ private:
     int finish_main();
     int give_back_lost();
     int go_on_without_main(const char* reason);
+    uint64_t sum_of(std::atomic<uint64_t> BackendCounters::* counter) const;
     void note(const std::string& text);
     void update_total() { total_ = film_.iterations() + unsaved_.size(); }
 

@@ -55,7 +55,7 @@ void StrategyRenderer::iterate(uint32_t iteration) {
     pool_.run(window_.height, [&](uint32_t y) {
         for (uint32_t x = 0; x < window_.width; ++x) {
             EyeSink found{*this, static_cast<size_t>(y) * window_.width + x};
-            trace_eye_path(scene, pass_, cache, iteration, window_.x + x, window_.y + y, found);
+            trace_eye_path(scene, pass_, cache, {0, iteration}, window_.x + x, window_.y + y, found);
         }
     });
     ++iterations_;

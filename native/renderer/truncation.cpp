@@ -63,7 +63,7 @@ LostLight measure_lost_light(const SceneView& scene, const PassSettings& pass, T
             TruncationSink& pixel = pixels[size_t{j} * columns + i];
             const uint32_t x = static_cast<uint32_t>((uint64_t{2} * i + 1) * camera.width / (2 * columns));
             const uint32_t y = static_cast<uint32_t>((uint64_t{2} * j + 1) * camera.height / (2 * rows));
-            for (uint32_t s = 0; s < k_samples; ++s) trace_eye_path(scene, pilot, {}, s, x, y, pixel);
+            for (uint32_t s = 0; s < k_samples; ++s) trace_eye_path(scene, pilot, {}, {0, s}, x, y, pixel);
         }
     });
     double light = 0, lost = 0;

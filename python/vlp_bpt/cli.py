@@ -79,7 +79,9 @@ def _render(options: argparse.Namespace) -> int:
     if range_ is not None:
         if values.get("noise_threshold"):
             raise UsageError("--iterations says how many iterations to render: leave the noise threshold out")
-        values |= {"samples": range_[1] - range_[0], "noise_threshold": 0.0}
+        if values.get("adaptive"):
+            raise UsageError("--iterations needs the same samples wherever they are made: leave adaptive out")
+        values |= {"samples": range_[1] - range_[0], "noise_threshold": 0.0, "adaptive": False}
     if kind == "blend" and range_ is None:
         return _render_blend(options, values)
     snapshot, warnings, settings = _scene_to_render(options, kind, values)

@@ -174,13 +174,12 @@ class Renderer:
     @property
     def statistics(self) -> Statistics:
         """What was rendered so far and what it took."""
-        _, _, width, height = self.film.render_window
         rendered = sum(end - begin for begin, end in self._native.ranges.items())  # here, not in film states added
         return Statistics(
             iterations=self.iterations,
             seconds=self._seconds,
             build_seconds=self._build_seconds,
-            eye_samples=rendered * width * height,
+            eye_samples=int(self._native.eye_samples),
             light_paths=rendered * int(self._native.light_paths),
             vlps=int(self._native.vlps),
             dropped=int(self._native.dropped),

@@ -63,15 +63,16 @@ class ModePreset:
     light_samples: int
     splats: bool
     roulette: bool
+    adaptive: bool
     weighting: Weighting
     pixels_per_light_path: int
     light_vertices: int
 
 
 MODE_PRESETS: dict[Mode, ModePreset] = {
-    Mode.PAPER: ModePreset(1, 5, 1, 1, 1, False, False, Weighting.UNIFORM, 1, light_vertices=1 << 23),
-    Mode.BALANCED: ModePreset(12, 16, 1, 1, 1, True, True, Weighting.BALANCE, 8, light_vertices=1 << 23),
-    Mode.REFERENCE: ModePreset(64, 64, 1, 1, 1, True, True, Weighting.BALANCE, 4, light_vertices=1 << 21),
+    Mode.PAPER: ModePreset(1, 5, 1, 1, 1, False, False, False, Weighting.UNIFORM, 1, light_vertices=1 << 23),
+    Mode.BALANCED: ModePreset(12, 16, 1, 1, 1, True, True, True, Weighting.BALANCE, 8, light_vertices=1 << 23),
+    Mode.REFERENCE: ModePreset(64, 64, 1, 1, 1, True, True, False, Weighting.BALANCE, 4, light_vertices=1 << 21),
 }
 
 # The least and the most that a number may be, both allowed.
@@ -94,7 +95,7 @@ RANGES: dict[str, tuple[float, float]] = {
 
 _ENUMS: dict[str, type[StrEnum]] = {"mode": Mode, "weighting": Weighting, "filter": Filter, "device": Device}
 _REALS = ("time_limit", "noise_threshold", "clamp_direct", "clamp_indirect", "filter_width")
-_SWITCHES = ("splats", "roulette", "hits", "denoise", "denoise_prefilter")
+_SWITCHES = ("splats", "roulette", "adaptive", "hits", "denoise", "denoise_prefilter")
 _ON_OFF = {"on": True, "true": True, "yes": True, "1": True, "off": False, "false": False, "no": False, "0": False}
 # What a mode decides where it is None.
 FROM_MODE = (
@@ -106,6 +107,7 @@ FROM_MODE = (
     "light_samples",
     "splats",
     "roulette",
+    "adaptive",
     "weighting",
 )
 
@@ -121,7 +123,8 @@ class RenderSettings:
     points joined to one eye vertex. vlp_candidates: M, how many each of them is chosen from, by the light that it would
     bring if nothing stood between. light_samples: S, light samples at one eye vertex. splats: light paths are joined to
     the lens. roulette: paths end at random, the dimmer the sooner, and those that go on make up for it; else all of
-    them go on up to L and K. hits: eye paths that meet a light count.
+    them go on up to L and K. adaptive: from the ninth iteration on, iterations take more samples in pixels that are
+    noisier and fewer in others, one a pixel on average; without bias (native/film/sample_rates.h). hits: eye paths that meet a light count.
     clamp_direct, clamp_indirect: the most that one find of light after at most one surface, or after more, may add to
     a pixel (mean of its channels); 0: no limit. Clamping removes bright specks and the light in them: it is a bias.
     denoise: the finished picture is denoised by Open Image Denoise, guided by colours and normals that the eye paths
@@ -144,6 +147,7 @@ class RenderSettings:
     light_samples: int | None = None
     splats: bool | None = None
     roulette: bool | None = None
+    adaptive: bool | None = None
     hits: bool = True
     weighting: Weighting | None = None
     clamp_direct: float = 0.0
@@ -215,6 +219,7 @@ class ResolvedSettings(RenderSettings):
     light_samples: int = 1
     splats: bool = True
     roulette: bool = True
+    adaptive: bool = True
     weighting: Weighting = Weighting.BALANCE
 
 

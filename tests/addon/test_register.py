@@ -72,6 +72,7 @@ def test_each_setting_is_exported() -> None:
         "light_samples": 3,
         "splats": False,
         "roulette": False,
+        "adaptive": False,
         "hits": False,
         "weighting": "POWER",
         "filter": "GAUSSIAN",

@@ -107,6 +107,36 @@ TEST_P(GpuPasses, MakeTheCpusSums) {
 INSTANTIATE_TEST_SUITE_P(All, GpuPasses, testing::ValuesIn(passes()),
                          [](const auto& chosen) { return std::string(chosen.param.name); });
 
+// Over three plans, of which the device is told each; the block between them is interrupted.
+TEST(GpuBackend, SamplesAdaptAsOnTheCpu) {
+    const auto scene = room();
+    for (const bool guides : {false, true}) {
+        PassSettings asked = balanced();
+        asked.adaptive = true, asked.guides = guides;
+        const PassSettings pass = for_scene(scene->view(), asked);
+        const std::vector<ExactSum> expected = cpu_sums(*scene, pass, 40);
+        asked.adaptive = false;
+        const std::vector<ExactSum> uniform = cpu_sums(*scene, for_scene(scene->view(), asked), 40);
+        EXPECT_NE(std::memcmp(expected.data(), uniform.data(), uniform.size() * sizeof(ExactSum)), 0);
+        for (const Eager eager : {Eager::none, Eager::passes, Eager::copies}) {
+            HostMachine machine;
+            machine.eager = eager;
+            HostBackend gpu(*scene, pass, machine);
+            Film film(scene->window(), pass.splats, pass.guides);
+            for (uint32_t i = 0; i < 40; ++i) {
+                if (i == 20) {
+                    EXPECT_FALSE(gpu.run_iteration(i, film, true));
+                }
+                EXPECT_TRUE(gpu.run_iteration(i, film, false));
+                if (i % 7 == 1) gpu.begin_collect();
+            }
+            gpu.finish();
+            gpu.collect(film);
+            expect_same_sums(film.sums(), expected);
+        }
+    }
+}
+
 TEST(GpuBackend, AWindowIsAPartOfThePicture) {
     auto scene = crowded_room(every_light().front().add, 24);
     scene->reopen({});

@@ -204,7 +204,7 @@ void record_paths(const SceneView& scene, const PassSettings& pass, uint32_t ite
     for (uint32_t y = 0; y < scene.camera.height; ++y) {
         for (uint32_t x = 0; x < scene.camera.width; ++x) {
             PathRecorder<F&> recorder{scene, pass, light.cache, iteration, on_path};
-            trace_eye_path(scene, pass, light.cache, iteration, x, y, recorder);
+            trace_eye_path(scene, pass, light.cache, {0, iteration}, x, y, recorder);
         }
     }
 }

@@ -142,7 +142,7 @@ TEST_P(StrategiesTest, FindTheSameLight) {
             const TracedLight light(scene.view(), light_pass, iteration);
             for (const SplatRecorder::Found& found : light.splats) batches[b].add(found);
             for (uint32_t i = 0; i < k_pixels * k_pixels; ++i) {
-                trace_eye_path(scene.view(), pass, light.cache, iteration, i % k_pixels, i / k_pixels, batches[b]);
+                trace_eye_path(scene.view(), pass, light.cache, {0, iteration}, i % k_pixels, i / k_pixels, batches[b]);
             }
         }
     }

@@ -42,6 +42,7 @@ class FakeRenderer:
         self.next = settings["iteration_begin"]
         self.iterations, self.total, self.vlps, self.dropped = 0, 0, 7, 0
         self.light_paths = settings["light_paths"]
+        self.eye_samples = 0
         self.deadline = float("inf")
         self.asked: list[int] = []
         self.threads: set[str] = set()
@@ -72,6 +73,7 @@ class FakeRenderer:
             self.next += 1
             self.total += self.next
             self.iterations += 1
+            self.eye_samples += self.width * self.height
             done += 1
         return done
 

@@ -48,8 +48,12 @@ def test_more_light_paths_and_pixels_take_more() -> None:
     one, two = (plan_memory(scene, native_scene, replace(cuda, light_paths=n)) for n in (1000, 2000))
     assert one["CUDA"]["light_vertices"] == 1000 * 4 * 68
     assert two["CUDA"]["light_vertices"] == 2 * one["CUDA"]["light_vertices"]
-    assert one["CUDA"]["film"] == 40 * 24 * (16 + 48 + 64)
-    assert one["CPU"]["film"] == 40 * 24 * (16 + 48 + 64 + 64)  # and the sums that come from the GPU
+    # Samples, splats, sums; moments, level and variance of adaptive sampling.
+    assert one["CUDA"]["film"] == 40 * 24 * (16 + 48 + 64 + 16 + 1 + 4)
+    # And the sums and the variance that come from the GPU, and the level that goes there.
+    assert one["CPU"]["film"] == 40 * 24 * (16 + 48 + 64 + 64 + 4 + 1)
+    uniform = plan_memory(scene, native_scene, replace(cuda, adaptive=False))
+    assert uniform["CUDA"]["film"] == 40 * 24 * (16 + 48 + 64)
     assert two["CUDA"]["geometry"] == one["CUDA"]["geometry"]
 
 

@@ -18,7 +18,7 @@ from vlp_bpt.snapshot import scene_digest
 
 def part(path: Path, begin: int, end: int, scene: Scene | None = None, **settings: Any) -> Path:
     scene = scene or room()
-    renderer = Renderer(scene, RenderSettings(samples=end - begin, **settings), first_iteration=begin)
+    renderer = Renderer(scene, RenderSettings(samples=end - begin, adaptive=False, **settings), first_iteration=begin)
     image = renderer.render()
     image.metadata["scene"] = scene_digest(scene)
     image.film_state = renderer.film_state()

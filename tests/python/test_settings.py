@@ -47,6 +47,7 @@ def test_what_is_set_stays(mode: Mode) -> None:
         "light_samples": 4,
         "splats": mode is Mode.PAPER,
         "roulette": mode is Mode.PAPER,
+        "adaptive": mode is Mode.PAPER,
         "vlp_candidates": 3,
         "weighting": Weighting.POWER,
     }
