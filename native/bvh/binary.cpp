@@ -13,7 +13,8 @@ namespace {
 using namespace binning;
 
 constexpr uint32_t k_chunk = 16384;
-constexpr uint32_t k_min_job = 4096;        // refs in a subtree that is worth a thread
+constexpr uint32_t k_min_job = 4096;  // refs in a subtree that is worth a thread
+constexpr uint32_t k_jobs_per_thread = 16;  // about, so that threads end together
 constexpr uint32_t k_min_parallel = 65536;  // refs in a node that is worth all threads
 
 // Refs [begin, end), around them, and around their centres.
@@ -67,7 +68,7 @@ public:
         tree_.box = all.box.box();
         tree_.nodes = LazyArray<BinaryNode>(count);
         std::vector<Job> large{{all, &tree_.root}}, small;
-        const uint32_t limit = max_of(k_min_job, count / 128);
+        const uint32_t limit = max_of(k_min_job, count / (k_jobs_per_thread * pool_.size()));
         LazyArray<Ref> scratch(count < limit ? 0 : count);
         while (!large.empty()) {
             const Job job = large.back();
@@ -77,7 +78,7 @@ public:
                 continue;
             }
             const bool parallel = pool_.size() > 1 && job.range.size() >= k_min_parallel;
-            const Cut cut = split(job.range, parallel, scratch.data() + job.range.begin);
+            const Cut cut = split(job.range, parallel, scratch.data());
             // The subtree that ends where this node is cut needs one place fewer than it has refs.
             if (!cut.leaf) descend(job, cut, cut.split - 1, large);
         }
@@ -100,7 +101,7 @@ private:
     }
 
     void build_small(const Job& first) {
-        std::vector<Ref> scratch(first.range.size());
+        LazyArray<Ref> scratch(first.range.size());
         uint32_t next = first.range.begin;
         std::vector<Job> stack{first};
         while (!stack.empty()) {
@@ -118,10 +119,12 @@ private:
         if (cut.leaf) return cut;
         const Binning binning(range.centers, bins_for(range.size()));
         Bins bins(binning.bins);
+        std::vector<Bins> of_chunks;
         Split best;
         if (range.depth < max_depth_) {
             if (parallel) {
-                bin_in_parallel(range, binning, bins);
+                of_chunks = bin_in_parallel(range, binning);
+                for (const Bins& chunk : of_chunks) bins.include(chunk);
             } else {
                 bins.add(refs_.data(), range.begin, range.end, binning);
             }
@@ -138,8 +141,10 @@ private:
             cut.side[0] = bounds(range.begin, cut.split, parallel);
             cut.side[1] = bounds(cut.split, range.end, parallel);
         } else {
-            const SideCenters centers = parallel ? partition_in_parallel(range, binning, best, scratch, cut.split)
-                                                 : partition(range, binning, best, scratch, cut.split);
+            const SideOf side_of(binning, best);
+            const SideCenters centers = parallel
+                                            ? partition_in_parallel(range, side_of, of_chunks, best, scratch, cut.split)
+                                            : partition(range, side_of, scratch, cut.split);
             const std::array<Bounds, 2> boxes = boxes_of(bins, best);
             for (uint32_t i : {0u, 1u}) cut.side[i].box = boxes[i], cut.side[i].centers = centers.side[i];
         }
@@ -168,9 +173,9 @@ private:
     }
 
     Range bounds(uint32_t begin, uint32_t end, bool parallel) {
-        const uint32_t chunks = (end - begin + k_chunk - 1) / k_chunk;
         Range all;
         all.begin = begin, all.end = end;
+        const uint32_t chunks = chunks_of(all);
         if (!parallel) {
             for (uint32_t i = begin; i < end; ++i) all.include(RefBounds(refs_[i]));
             return all;
@@ -197,16 +202,15 @@ private:
     }
 
     // Both partitions keep the order on each side, and tell where the right one begins.
-    SideCenters partition(const Range& range, const Binning& binning, const Split& best, Ref* scratch,
-                          uint32_t& split) {
+    SideCenters partition(const Range& range, const SideOf& side_of, Ref* scratch, uint32_t& split) {
         SideCenters centers;
         Ref* const refs = refs_.data();
         uint32_t left = range.begin, right = 0;
         for (uint32_t i = range.begin; i < range.end; ++i) {
-            const Ref ref = refs[i];
-            const uint32_t side = binning.bin_of(ref, best.axis) < best.bin ? 0 : 1;
-            centers.include(RefBounds(ref).center, side);
-            refs[left] = scratch[right] = ref;
+            const RefRows rows(refs[i]);
+            const uint32_t side = side_of(refs[i]);
+            centers.include(RefBounds(rows).center, side);
+            rows.store(refs[left]), rows.store(scratch[right]);
             left += 1 - side, right += side;
         }
         std::copy_n(scratch, right, refs + left);
@@ -214,55 +218,50 @@ private:
         return centers;
     }
 
-    void bin_in_parallel(const Range& range, const Binning& binning, Bins& bins) {
-        const uint32_t chunks = (range.size() + k_chunk - 1) / k_chunk;
-        std::vector<Bins> parts(chunks, Bins(binning.bins));
-        pool_.run(chunks, [&](uint32_t chunk) {
+    static uint32_t chunks_of(const Range& range) { return (range.size() + k_chunk - 1) / k_chunk; }
+
+    std::vector<Bins> bin_in_parallel(const Range& range, const Binning& binning) {
+        std::vector<Bins> parts(chunks_of(range), Bins(binning.bins));
+        pool_.run(chunks_of(range), [&](uint32_t chunk) {
             const uint32_t begin = range.begin + chunk * k_chunk;
             parts[chunk].add(refs_.data(), begin, min_of(range.end, begin + k_chunk), binning);
         });
-        for (const Bins& part : parts) bins.include(part);
+        return parts;
     }
 
-    // Every chunk counts, then writes its refs to their places in a second array.
-    SideCenters partition_in_parallel(const Range& range, const Binning& binning, const Split& best, Ref* scratch,
-                                      uint32_t& split) {
-        const uint32_t chunks = (range.size() + k_chunk - 1) / k_chunk;
+    // Every chunk writes its refs to their places in `scratch`, which the bins tell beforehand.
+    SideCenters partition_in_parallel(const Range& range, const SideOf& side_of, const std::vector<Bins>& bins,
+                                      const Split& best, Ref* scratch, uint32_t& split) {
         struct Part {
+            uint32_t place[2];
             SideCenters centers;
-            uint32_t count[2] = {0, 0};
         };
-        std::vector<Part> parts(chunks);
-        const auto side_of = [&](const Ref& ref) { return binning.bin_of(ref, best.axis) < best.bin ? 0u : 1u; };
-        const auto chunk_end = [&](uint32_t chunk) { return min_of(range.end, range.begin + (chunk + 1) * k_chunk); };
-        pool_.run(chunks, [&](uint32_t chunk) {
-            Part part;
-            for (uint32_t i = range.begin + chunk * k_chunk; i < chunk_end(chunk); ++i) {
+        std::vector<Part> parts(bins.size());
+        uint32_t left = 0;
+        for (size_t chunk = 0; chunk < bins.size(); ++chunk) {
+            parts[chunk].place[0] = left;
+            left += bins[chunk].count_below(best);
+        }
+        for (uint32_t chunk = 0; chunk < parts.size(); ++chunk) {
+            parts[chunk].place[1] = left + chunk * k_chunk - parts[chunk].place[0];
+        }
+        pool_.run(static_cast<uint32_t>(parts.size()), [&](uint32_t chunk) {
+            Part part = parts[chunk];
+            const uint32_t begin = range.begin + chunk * k_chunk, end = min_of(range.end, begin + k_chunk);
+            for (uint32_t i = begin; i < end; ++i) {
+                const RefRows rows(refs_[i]);
                 const uint32_t side = side_of(refs_[i]);
-                part.centers.include(RefBounds(refs_[i]).center, side);
-                part.count[1] += side;
+                part.centers.include(RefBounds(rows).center, side);
+                rows.store(scratch[part.place[side]++]);
             }
-            part.count[0] = chunk_end(chunk) - range.begin - chunk * k_chunk - part.count[1];
-            parts[chunk] = part;
+            parts[chunk].centers = part.centers;
+        });
+        pool_.run(static_cast<uint32_t>(parts.size()), [&](uint32_t chunk) {
+            const uint32_t begin = chunk * k_chunk, end = min_of(range.size(), begin + k_chunk);
+            std::copy(scratch + begin, scratch + end, refs_.data() + range.begin + begin);
         });
         SideCenters centers;
-        uint32_t left = 0;
-        for (const Part& part : parts) centers.include(part.centers), left += part.count[0];
-        uint32_t next[2] = {0, left};
-        for (Part& part : parts) {
-            for (uint32_t side : {0u, 1u}) next[side] += std::exchange(part.count[side], next[side]);
-        }
-        pool_.run(chunks, [&](uint32_t chunk) {
-            uint32_t place[2] = {parts[chunk].count[0], parts[chunk].count[1]};
-            for (uint32_t i = range.begin + chunk * k_chunk; i < chunk_end(chunk); ++i) {
-                scratch[place[side_of(refs_[i])]++] = refs_[i];
-            }
-        });
-        pool_.run(chunks, [&](uint32_t chunk) {
-            const uint32_t begin = range.begin + chunk * k_chunk;
-            std::copy(scratch + (begin - range.begin), scratch + (chunk_end(chunk) - range.begin),
-                      refs_.data() + begin);
-        });
+        for (const Part& part : parts) centers.include(part.centers);
         split = range.begin + left;
         return centers;
     }

@@ -39,18 +39,27 @@ struct Bounds {
 
 inline constexpr Bounds k_nothing{{k_infinity, k_infinity, k_infinity, 0}, {-k_infinity, -k_infinity, -k_infinity, 0}};
 
+// A ref in two registers.
+struct RefRows {
+    Int4 low, high;
+
+    explicit RefRows(const Ref& ref) {
+        static_assert(sizeof(Ref) == sizeof(RefRows));
+        std::memcpy(this, &ref, sizeof ref);
+    }
+    void store(Ref& ref) const { std::memcpy(static_cast<void*>(&ref), this, sizeof ref); }
+};
+
 // A ref's corners and twice its centre.
 struct RefBounds {
     Float4 low, high, center;
 
-    explicit RefBounds(const Ref& ref) {
-        static_assert(sizeof(Ref) == 2 * sizeof(Float4));
-        Int4 rows[2];
-        std::memcpy(rows, &ref, sizeof rows);
+    explicit RefBounds(const RefRows& rows) {
         const Int4 numbers{-1, -1, -1, 0};  // indices as numbers would be denormal, and slow
-        low = std::bit_cast<Float4>(rows[0] & numbers), high = std::bit_cast<Float4>(rows[1] & numbers);
+        low = std::bit_cast<Float4>(rows.low & numbers), high = std::bit_cast<Float4>(rows.high & numbers);
         center = low + high;
     }
+    explicit RefBounds(const Ref& ref) : RefBounds(RefRows(ref)) {}
 };
 
 // Which bin a centre falls into, along each axis. An axis along which nothing can be split has all in bin 0.
@@ -67,11 +76,12 @@ struct Binning {
         }
     }
     Int4 bins_of(Float4 center) const { return __builtin_convertvector(min4((center - low) * scale, last), Int4); }
-    // The same along one axis.
-    int32_t bin_of(const Ref& ref, uint32_t axis) const {
-        const float center = (&ref.low.x)[axis] + (&ref.high.x)[axis];
-        return static_cast<int32_t>(min_of((center - low[axis]) * scale[axis], last[axis]));
-    }
+};
+
+struct Split {
+    float cost = k_infinity;  // areas times blocks, not yet divided by the node's area
+    uint32_t axis = k_none;   // k_none: cut in halves
+    int32_t bin = 0;          // first bin of the right side
 };
 
 // What fell into the bins of one index: a box and a count for each axis.
@@ -105,12 +115,31 @@ struct Bins {
             bin[i].count += other.bin[i].count;
         }
     }
+    // Refs on the left of a split.
+    uint32_t count_below(const Split& split) const {
+        int32_t refs = 0;
+        for (int32_t i = 0; i < split.bin; ++i) refs += bin[static_cast<uint32_t>(i)].count[split.axis];
+        return static_cast<uint32_t>(refs);
+    }
 };
 
-struct Split {
-    float cost = k_infinity;  // areas times blocks, not yet divided by the node's area
-    uint32_t axis = k_none;   // k_none: cut in halves
-    int32_t bin = 0;          // first bin of the right side
+// On which side of a split a ref lies: 1 if its bin is not below that of the split.
+class SideOf {
+public:
+    SideOf(const Binning& binning, const Split& split)
+        : axis_(split.axis),
+          low_(binning.low[axis_]),
+          scale_(binning.scale[axis_]),
+          bin_(static_cast<float>(split.bin)) {}
+
+    uint32_t operator()(const Ref& ref) const {
+        const float center = (&ref.low.x)[axis_] + (&ref.high.x)[axis_];
+        return (center - low_) * scale_ < bin_ ? 0 : 1;
+    }
+
+private:
+    uint32_t axis_;
+    float low_, scale_, bin_;
 };
 
 // The boxes of three axes and how many refs they have, which grow bin by bin.
