@@ -33,12 +33,12 @@ struct SideCenters {
     Bounds side[2] = {k_nothing, k_nothing};
 
     void include(Float4 center, uint32_t to) {
-        const Int4 right = Int4{} - static_cast<int32_t>(to);
-        const Float4 nothing = all4(k_infinity);
-        side[0].low = min4(side[0].low, right ? nothing : center);
-        side[0].high = max4(side[0].high, right ? -nothing : center);
-        side[1].low = min4(side[1].low, right ? center : nothing);
-        side[1].high = max4(side[1].high, right ? center : -nothing);
+        const Int4 right = Int4{} - static_cast<int32_t>(to), bits = std::bit_cast<Int4>(center);
+        // What goes to the other side is not a number, of which neither the least nor the most is taken.
+        const Float4 of_side[2] = {std::bit_cast<Float4>(bits | right), std::bit_cast<Float4>(bits | ~right)};
+        for (uint32_t i : {0u, 1u}) {
+            side[i].low = min4(of_side[i], side[i].low), side[i].high = max4(of_side[i], side[i].high);
+        }
     }
     void include(const SideCenters& other) {
         for (uint32_t i : {0u, 1u}) side[i].include(other.side[i]);
