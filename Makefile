@@ -86,6 +86,10 @@ bench-peers: build .venv/.peers ## beside Cycles, Mitsuba and LuxCore: out/bench
 bench-growth: build ## how costs grow with triangles, lights, pixels and threads: out/bench-growth/report.md (minutes)
 	.venv/bin/vlp-bpt bench growth
 
+.PHONY: bench-start
+bench-start: build ## from Blender's scene to the first iteration, beside Cycles: out/bench-start/report.md (minutes)
+	.venv/bin/vlp-bpt bench start
+
 .PHONY: bench-rays
 bench-rays: build ## rays a second, beside Embree's where its headers are (Debian: libembree-dev), and steps a ray
 	@$(BIN)/cmake -DVLP_BENCH=ON build/venv >build/configure.log || { cat build/configure.log >&2; exit 1; }

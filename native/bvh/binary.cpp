@@ -3,58 +3,21 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 
-#include "bvh/layout.h"
+#include "bvh/bins.h"
 
 namespace vlp {
 
 namespace {
 
-constexpr uint32_t k_max_bins = 32;
+using namespace binning;
+
 constexpr uint32_t k_chunk = 16384;
-constexpr uint32_t k_min_job = 4096;        // refs in a subtree that is worth a thread
+constexpr uint32_t k_min_job = 4096;  // refs in a subtree that is worth a thread
+constexpr uint32_t k_jobs_per_thread = 16;  // about, so that threads end together
 constexpr uint32_t k_min_parallel = 65536;  // refs in a node that is worth all threads
 
-// Few refs need few bins, which take less time to clear and to sweep than refs to sort.
-uint32_t bins_for(uint32_t refs) { return refs < 32 ? 8 : refs < 1024 ? 16 : k_max_bins; }
-
-// Three floats and a zero in one register.
-using Float4 = float __attribute__((vector_size(16)));
-
-Float4 min4(Float4 a, Float4 b) { return a < b ? a : b; }
-Float4 max4(Float4 a, Float4 b) { return a > b ? a : b; }
-Vec3 to_vec3(Float4 v) { return {v[0], v[1], v[2]}; }
-
-struct Bounds {
-    Float4 low, high;
-
-    void include(Float4 from, Float4 to) { low = min4(low, from), high = max4(high, to); }
-    void include(const Bounds& b) { include(b.low, b.high); }
-    Box box() const { return {to_vec3(low), to_vec3(high)}; }
-    float half_area() const {
-        const Float4 e = high - low;
-        return e[0] >= 0 ? e[0] * (e[1] + e[2]) + e[1] * e[2] : 0;
-    }
-};
-
-constexpr Bounds k_nothing{{k_infinity, k_infinity, k_infinity, 0}, {-k_infinity, -k_infinity, -k_infinity, 0}};
-
-// A ref's corners and its centre.
-struct RefBounds {
-    Float4 low, high, center;
-
-    explicit RefBounds(const Ref& ref) {
-        static_assert(sizeof(Ref) == 2 * sizeof(Float4));
-        Float4 rows[2];
-        std::memcpy(rows, &ref, sizeof rows);
-        low = rows[0], high = rows[1];
-        low[3] = high[3] = 0;  // indices, which as numbers would be denormal, and slow
-        center = (low + high) * 0.5f;
-    }
-};
-
-// Refs [begin, end) and their bounds.
+// Refs [begin, end), around them, and around their centres.
 struct Range {
     uint32_t begin = 0, end = 0;
     uint32_t depth = 0;
@@ -65,97 +28,34 @@ struct Range {
     void include(const Range& r) { box.include(r.box), centers.include(r.centers); }
 };
 
-struct Bin {
-    Bounds box;
-    uint32_t count;
-};
+// Around the centres of the refs that go to each side, which no branch waits for.
+struct SideCenters {
+    Bounds side[2] = {k_nothing, k_nothing};
 
-// `count` bins along each axis; the others are never touched.
-struct Bins {
-    std::array<std::array<Bin, k_max_bins>, 3> axis;
-    uint32_t count;
-
-    explicit Bins(uint32_t bins) : count(bins) {
-        for (auto& row : axis) std::fill_n(row.begin(), count, Bin{k_nothing, 0});
-    }
-
-    void include(const Bins& other) {
-        for (size_t a = 0; a < 3; ++a) {
-            for (size_t i = 0; i < count; ++i) {
-                axis[a][i].box.include(other.axis[a][i].box);
-                axis[a][i].count += other.axis[a][i].count;
-            }
+    void include(Float4 center, uint32_t to) {
+        const Int4 right = Int4{} - static_cast<int32_t>(to), bits = std::bit_cast<Int4>(center);
+        // What goes to the other side is not a number, of which neither the least nor the most is taken.
+        const Float4 of_side[2] = {std::bit_cast<Float4>(bits | right), std::bit_cast<Float4>(bits | ~right)};
+        for (uint32_t i : {0u, 1u}) {
+            side[i].low = min4(of_side[i], side[i].low), side[i].high = max4(of_side[i], side[i].high);
         }
+    }
+    void include(const SideCenters& other) {
+        for (uint32_t i : {0u, 1u}) side[i].include(other.side[i]);
     }
 };
 
-// Which bin a centre falls into, along each axis.
-struct Binning {
-    Float4 low, scale;
-    uint32_t bins;
-
-    Binning(const Bounds& centers, uint32_t bin_count) : low(centers.low), scale{0, 0, 0, 0}, bins(bin_count) {
-        for (int a = 0; a < 3; ++a) {
-            const float extent = centers.high[a] - centers.low[a];
-            scale[a] = extent > 0 ? static_cast<float>(bins) * (1 - 0x1p-20f) / extent : 0.0f;
-        }
-    }
-    // An extent whose inverse overflows makes infinite scales: min_of keeps every index in range.
-    uint32_t index(float x) const { return x < static_cast<float>(bins) ? static_cast<uint32_t>(x) : bins - 1; }
-    std::array<uint32_t, 3> bins_of(Float4 c) const {
-        const Float4 b = (c - low) * scale;
-        return {index(b[0]), index(b[1]), index(b[2])};
-    }
-    uint32_t bin_of(Float4 c, uint32_t axis) const { return index((c[axis] - low[axis]) * scale[axis]); }
-    bool splits(uint32_t axis) const { return scale[axis] > 0 && scale[axis] < k_infinity; }
+// A range and where its node's index is to be written.
+struct Job {
+    Range range;
+    uint32_t* place;
 };
 
-struct Split {
-    float cost = k_infinity;  // areas times blocks, not yet divided by the node's area
-    uint32_t axis = k_none;   // k_none: cut in halves
-    uint32_t bin = 0;         // first bin of the right side
+struct Cut {
+    bool leaf = false;
+    uint32_t split = 0;
+    Range side[2];
 };
-
-float blocks(uint32_t refs) { return static_cast<float>(blocks_for(refs)); }
-
-Split best_split(const Bins& bins, const Binning& binning) {
-    Split best;
-    for (uint32_t axis = 0; axis < 3; ++axis) {
-        if (!binning.splits(axis)) continue;
-        const auto& row = bins.axis[axis];
-        std::array<float, k_max_bins> right_cost;
-        std::array<uint32_t, k_max_bins> right_count;
-        Bounds box = k_nothing;
-        uint32_t count = 0;
-        for (uint32_t i = bins.count - 1; i > 0; --i) {
-            box.include(row[i].box);
-            count += row[i].count;
-            right_cost[i] = box.half_area() * blocks(count);
-            right_count[i] = count;
-        }
-        box = k_nothing, count = 0;
-        for (uint32_t i = 1; i < bins.count; ++i) {
-            box.include(row[i - 1].box);
-            count += row[i - 1].count;
-            if (count == 0 || right_count[i] == 0) continue;
-            const float cost = box.half_area() * blocks(count) + right_cost[i];
-            if (cost < best.cost) best = {cost, axis, i};
-        }
-    }
-    return best;
-}
-
-void add_to_bins(const Ref* refs, uint32_t begin, uint32_t end, const Binning& binning, Bins& bins) {
-    for (uint32_t i = begin; i < end; ++i) {
-        const RefBounds ref(refs[i]);
-        const std::array<uint32_t, 3> b = binning.bins_of(ref.center);
-        for (uint32_t axis = 0; axis < 3; ++axis) {
-            Bin& bin = bins.axis[axis][b[axis]];
-            bin.box.include(ref.low, ref.high);
-            ++bin.count;
-        }
-    }
-}
 
 class Builder {
 public:
@@ -166,9 +66,10 @@ public:
         const auto count = static_cast<uint32_t>(refs_.size());
         const Range all = bounds(0, count, true);
         tree_.box = all.box.box();
-        tree_.nodes.resize(count);
+        tree_.nodes = LazyArray<BinaryNode>(count);
         std::vector<Job> large{{all, &tree_.root}}, small;
-        const uint32_t limit = max_of(k_min_job, count / 128);
+        const uint32_t limit = max_of(k_min_job, count / (k_jobs_per_thread * pool_.size()));
+        LazyArray<Ref> scratch(count < limit ? 0 : count);
         while (!large.empty()) {
             const Job job = large.back();
             large.pop_back();
@@ -176,80 +77,85 @@ public:
                 small.push_back(job);
                 continue;
             }
-            const Cut cut = split(job.range, job.range.size() >= k_min_parallel);
-            if (cut.leaf) continue;
-            descend(job, cut, large);
+            const bool parallel = pool_.size() > 1 && job.range.size() >= k_min_parallel;
+            const Cut cut = split(job.range, parallel, scratch.data());
+            // The subtree that ends where this node is cut needs one place fewer than it has refs.
+            if (!cut.leaf) descend(job, cut, cut.split - 1, large);
         }
+        scratch = {};
         std::stable_sort(small.begin(), small.end(),
                          [](const Job& a, const Job& b) { return a.range.size() > b.range.size(); });
         pool_.run(static_cast<uint32_t>(small.size()), [&](uint32_t i) { build_small(small[i]); });
     }
 
 private:
-    // A range and where its node's index is to be written.
-    struct Job {
-        Range range;
-        uint32_t* place;
-    };
-    struct Cut {
-        bool leaf;
-        uint32_t split;
-        Range side[2];
-    };
-
     // Writes the node of a cut, and puts its sides on the stack, left one on top.
-    void descend(const Job& job, const Cut& cut, std::vector<Job>& stack) {
-        BinaryNode& node = tree_.nodes[cut.split];
-        *job.place = cut.split;
+    void descend(const Job& job, const Cut& cut, uint32_t index, std::vector<Job>& stack) {
+        BinaryNode& node = tree_.nodes[index];
+        *job.place = index;
         node.box[0] = cut.side[0].box.box(), node.box[1] = cut.side[1].box.box();
         node.child[0] = node.child[1] = k_leaf_flag;
-        node.begin = job.range.begin, node.end = job.range.end;
+        node.split = cut.split;
         stack.push_back({cut.side[1], &node.child[1]});
         stack.push_back({cut.side[0], &node.child[0]});
     }
 
     void build_small(const Job& first) {
+        LazyArray<Ref> scratch(first.range.size());
+        uint32_t next = first.range.begin;
         std::vector<Job> stack{first};
         while (!stack.empty()) {
             const Job job = stack.back();
             stack.pop_back();
-            if (job.range.size() == 1) continue;
-            const Cut cut = split(job.range, false);
-            if (cut.leaf) continue;
-            descend(job, cut, stack);
+            const Cut cut = split(job.range, false, scratch.data());
+            if (!cut.leaf) descend(job, cut, next++, stack);
         }
     }
 
-    Cut split(const Range& range, bool parallel) {
+    // `scratch`: for as many refs as the range has.
+    Cut split(const Range& range, bool parallel, Ref* scratch) {
+        Cut cut;
+        cut.leaf = range.size() == 1 || (is_cheapest_as_block(range.size()) && alike(range));
+        if (cut.leaf) return cut;
         const Binning binning(range.centers, bins_for(range.size()));
+        Bins bins(binning.bins);
+        std::vector<Bins> of_chunks;
         Split best;
         if (range.depth < max_depth_) {
-            Bins bins(binning.bins);
             if (parallel) {
-                bin_in_parallel(range, binning, bins);
+                of_chunks = bin_in_parallel(range, binning);
+                for (const Bins& chunk : of_chunks) bins.include(chunk);
             } else {
-                add_to_bins(refs_.data(), range.begin, range.end, binning, bins);
+                bins.add(refs_.data(), range.begin, range.end, binning);
             }
-            best = best_split(bins, binning);
+            best = best_split(bins);
         }
         const float area = range.box.half_area();
-        const float leaf_cost = rule_.block_cost * blocks(range.size()) * area;
+        const float leaf_cost = rule_.block_cost * static_cast<float>(blocks_for(range.size())) * area;
         const float split_cost = area + rule_.block_cost * best.cost;
-        if (range.size() <= rule_.max_refs && !(split_cost < leaf_cost) && alike(range)) return {true, 0, {}};
-        Cut cut{false, 0, {}};
+        cut.leaf = range.size() <= rule_.max_refs && !(split_cost < leaf_cost) && alike(range);
+        if (cut.leaf) return cut;
         if (best.axis == k_none) {
             cut.split = range.begin + range.size() / 2;
             halve(range, cut.split);
             cut.side[0] = bounds(range.begin, cut.split, parallel);
             cut.side[1] = bounds(cut.split, range.end, parallel);
-        } else if (parallel) {
-            partition_in_parallel(range, binning, best, cut);
         } else {
-            partition(range, binning, best, cut);
+            const SideOf side_of(binning, best);
+            const SideCenters centers = parallel
+                                            ? partition_in_parallel(range, side_of, of_chunks, best, scratch, cut.split)
+                                            : partition(range, side_of, scratch, cut.split);
+            const std::array<Bounds, 2> boxes = boxes_of(bins, best);
+            for (uint32_t i : {0u, 1u}) cut.side[i].box = boxes[i], cut.side[i].centers = centers.side[i];
         }
         cut.side[0].begin = range.begin, cut.side[0].end = cut.side[1].begin = cut.split, cut.side[1].end = range.end;
         cut.side[0].depth = cut.side[1].depth = range.depth + 1;
         return cut;
+    }
+
+    // Whether so few refs are one block, which costs no more than the step to two.
+    bool is_cheapest_as_block(uint32_t size) const {
+        return size <= min_of(rule_.max_refs, k_block_width) && rule_.block_cost <= 1;
     }
 
     // Refs of one leaf are of one kind, and an instance is alone in its leaf.
@@ -267,17 +173,19 @@ private:
     }
 
     Range bounds(uint32_t begin, uint32_t end, bool parallel) {
-        const uint32_t chunks = (end - begin + k_chunk - 1) / k_chunk;
         Range all;
         all.begin = begin, all.end = end;
+        const uint32_t chunks = chunks_of(all);
         if (!parallel) {
             for (uint32_t i = begin; i < end; ++i) all.include(RefBounds(refs_[i]));
             return all;
         }
         std::vector<Range> parts(chunks);
         pool_.run(chunks, [&](uint32_t chunk) {
+            Range part;
             const uint32_t stop = min_of(end, begin + (chunk + 1) * k_chunk);
-            for (uint32_t i = begin + chunk * k_chunk; i < stop; ++i) parts[chunk].include(RefBounds(refs_[i]));
+            for (uint32_t i = begin + chunk * k_chunk; i < stop; ++i) part.include(RefBounds(refs_[i]));
+            parts[chunk] = part;
         });
         for (const Range& part : parts) all.include(part);
         return all;
@@ -293,82 +201,72 @@ private:
                          [&](const Ref& a, const Ref& b) { return key(a) < key(b); });
     }
 
-    void partition(const Range& range, const Binning& binning, const Split& best, Cut& cut) {
-        uint32_t left = range.begin, right = range.end;
-        const auto goes_left = [&](const RefBounds& r) { return binning.bin_of(r.center, best.axis) < best.bin; };
-        for (;;) {
-            for (; left < right; ++left) {
-                const RefBounds ref(refs_[left]);
-                if (!goes_left(ref)) break;
-                cut.side[0].include(ref);
-            }
-            for (; left < right; --right) {
-                const RefBounds ref(refs_[right - 1]);
-                if (goes_left(ref)) break;
-                cut.side[1].include(ref);
-            }
-            if (left == right) break;
-            std::swap(refs_[left], refs_[right - 1]);
+    // Both partitions keep the order on each side, and tell where the right one begins.
+    SideCenters partition(const Range& range, const SideOf& side_of, Ref* scratch, uint32_t& split) {
+        SideCenters centers;
+        Ref* const refs = refs_.data();
+        uint32_t left = range.begin, right = 0;
+        for (uint32_t i = range.begin; i < range.end; ++i) {
+            const RefRows rows(refs[i]);
+            const uint32_t side = side_of(refs[i]);
+            centers.include(RefBounds(rows).center, side);
+            rows.store(refs[left]), rows.store(scratch[right]);
+            left += 1 - side, right += side;
         }
-        cut.split = left;
+        std::copy_n(scratch, right, refs + left);
+        split = left;
+        return centers;
     }
 
-    void bin_in_parallel(const Range& range, const Binning& binning, Bins& bins) {
-        const uint32_t chunks = (range.size() + k_chunk - 1) / k_chunk;
-        std::vector<Bins> parts(chunks, Bins(binning.bins));
-        pool_.run(chunks, [&](uint32_t chunk) {
+    static uint32_t chunks_of(const Range& range) { return (range.size() + k_chunk - 1) / k_chunk; }
+
+    std::vector<Bins> bin_in_parallel(const Range& range, const Binning& binning) {
+        std::vector<Bins> parts(chunks_of(range), Bins(binning.bins));
+        pool_.run(chunks_of(range), [&](uint32_t chunk) {
             const uint32_t begin = range.begin + chunk * k_chunk;
-            add_to_bins(refs_.data(), begin, min_of(range.end, begin + k_chunk), binning, parts[chunk]);
+            parts[chunk].add(refs_.data(), begin, min_of(range.end, begin + k_chunk), binning);
         });
-        for (const Bins& part : parts) bins.include(part);
+        return parts;
     }
 
-    // Every chunk counts, then writes its refs to their places in a second array: the order stays.
-    void partition_in_parallel(const Range& range, const Binning& binning, const Split& best, Cut& cut) {
-        const uint32_t chunks = (range.size() + k_chunk - 1) / k_chunk;
-        scratch_.resize(refs_.size());
-        std::vector<std::array<Range, 2>> parts(chunks);
-        std::vector<std::array<uint32_t, 2>> counts(chunks);
-        const auto chunk_end = [&](uint32_t chunk) { return min_of(range.end, range.begin + (chunk + 1) * k_chunk); };
-        const auto side_of = [&](const RefBounds& r) {
-            return binning.bin_of(r.center, best.axis) < best.bin ? 0u : 1u;
+    // Every chunk writes its refs to their places in `scratch`, which the bins tell beforehand.
+    SideCenters partition_in_parallel(const Range& range, const SideOf& side_of, const std::vector<Bins>& bins,
+                                      const Split& best, Ref* scratch, uint32_t& split) {
+        struct Part {
+            uint32_t place[2];
+            SideCenters centers;
         };
-        pool_.run(chunks, [&](uint32_t chunk) {
-            for (uint32_t i = range.begin + chunk * k_chunk; i < chunk_end(chunk); ++i) {
-                const RefBounds ref(refs_[i]);
-                const uint32_t side = side_of(ref);
-                parts[chunk][side].include(ref);
-                ++counts[chunk][side];
-            }
-        });
-        uint32_t left = range.begin;
-        for (uint32_t chunk = 0; chunk < chunks; ++chunk) {
-            cut.side[0].include(parts[chunk][0]), cut.side[1].include(parts[chunk][1]);
-            left += counts[chunk][0];
+        std::vector<Part> parts(bins.size());
+        uint32_t left = 0;
+        for (size_t chunk = 0; chunk < bins.size(); ++chunk) {
+            parts[chunk].place[0] = left;
+            left += bins[chunk].count_below(best);
         }
-        cut.split = left;
-        uint32_t next[2] = {range.begin, left};
-        for (uint32_t chunk = 0; chunk < chunks; ++chunk) {
-            for (uint32_t side = 0; side < 2; ++side) {
-                const uint32_t count = counts[chunk][side];
-                counts[chunk][side] = next[side];
-                next[side] += count;
-            }
+        for (uint32_t chunk = 0; chunk < parts.size(); ++chunk) {
+            parts[chunk].place[1] = left + chunk * k_chunk - parts[chunk].place[0];
         }
-        pool_.run(chunks, [&](uint32_t chunk) {
-            std::array<uint32_t, 2> place = counts[chunk];
-            for (uint32_t i = range.begin + chunk * k_chunk; i < chunk_end(chunk); ++i) {
-                scratch_[place[side_of(RefBounds(refs_[i]))]++] = refs_[i];
+        pool_.run(static_cast<uint32_t>(parts.size()), [&](uint32_t chunk) {
+            Part part = parts[chunk];
+            const uint32_t begin = range.begin + chunk * k_chunk, end = min_of(range.end, begin + k_chunk);
+            for (uint32_t i = begin; i < end; ++i) {
+                const RefRows rows(refs_[i]);
+                const uint32_t side = side_of(refs_[i]);
+                part.centers.include(RefBounds(rows).center, side);
+                rows.store(scratch[part.place[side]++]);
             }
+            parts[chunk].centers = part.centers;
         });
-        pool_.run(chunks, [&](uint32_t chunk) {
-            const uint32_t begin = range.begin + chunk * k_chunk;
-            std::copy(scratch_.begin() + begin, scratch_.begin() + chunk_end(chunk), refs_.begin() + begin);
+        pool_.run(static_cast<uint32_t>(parts.size()), [&](uint32_t chunk) {
+            const uint32_t begin = chunk * k_chunk, end = min_of(range.size(), begin + k_chunk);
+            std::copy(scratch + begin, scratch + end, refs_.data() + range.begin + begin);
         });
+        SideCenters centers;
+        for (const Part& part : parts) centers.include(part.centers);
+        split = range.begin + left;
+        return centers;
     }
 
     std::vector<Ref>& refs_;
-    std::vector<Ref> scratch_;
     const LeafRule& rule_;
     uint32_t max_depth_;
     ThreadPool& pool_;

@@ -2,20 +2,22 @@
 #pragma once
 
 #include "bvh/refs.h"
+#include "core/lazy_array.h"
 
 namespace vlp {
 
 inline constexpr uint32_t k_leaf_flag = 0x80000000u;
 
-// The node that cuts refs [begin, end) at `split` stands at index `split` of the array: every thread knows its places.
+// Cuts refs [begin, end), which the one above it tells, at `split`.
 struct BinaryNode {
     Box box[2];
     uint32_t child[2];  // index of a node; k_leaf_flag: a leaf
-    uint32_t begin, end;
+    uint32_t split;
 };
 
+// Nodes stand at places below the number of refs, of which some are empty: every thread has its own.
 struct BinaryTree {
-    std::vector<BinaryNode> nodes;
+    LazyArray<BinaryNode> nodes;
     Box box;
     uint32_t root = k_leaf_flag;  // of all refs
 };

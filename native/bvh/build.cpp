@@ -89,7 +89,12 @@ size_t Bvh::bytes() const {
 Bvh build_bvh(std::span<const GeometryView> geometries, std::span<const InstanceView> instances, ThreadPool& pool) {
     const std::vector<uint8_t> flattened = choose_flattened(geometries, instances);
     std::vector<WideTree> trees = build_geometry_trees(geometries, instances, flattened, pool);
+    size_t count = 0;
+    for (size_t i = 0; i < instances.size(); ++i) {
+        count += flattened[i] ? geometries[instances[i].geometry].primitive_count : 1;
+    }
     std::vector<Ref> refs;
+    refs.reserve(count + k_free_splits + count / k_refs_per_split);
     std::vector<uint8_t> kinds(instances.size());
     for (size_t i = 0; i < instances.size(); ++i) {
         const InstanceView& instance = instances[i];

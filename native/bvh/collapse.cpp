@@ -10,6 +10,7 @@ namespace vlp {
 namespace {
 
 constexpr uint32_t k_min_job = 2048;  // refs in a subtree that is worth a thread
+constexpr uint32_t k_batch = 16;  // jobs of a thread before what they wrote is put into the tree, which takes memory
 
 // Opens the child with the most refs until a node is full, which bounds the depth.
 WideChildren balanced_children(const BinaryTree& tree, const Subtree& subtree) {
@@ -34,6 +35,20 @@ struct Job {
     Subtree subtree;
     uint32_t parent, slot;
 };
+
+// Of a wide tree or of a part of it.
+struct Size {
+    size_t nodes = 0;
+    size_t blocks[2] = {0, 0};  // by GeometryKind
+
+    void add(const Size& s) { nodes += s.nodes, blocks[0] += s.blocks[0], blocks[1] += s.blocks[1]; }
+};
+
+void reserve(WideTree& tree, const Size& size) {
+    tree.nodes.reserve(size.nodes);
+    tree.triangle_blocks.reserve(size.blocks[static_cast<size_t>(GeometryKind::mesh)]);
+    tree.sphere_blocks.reserve(size.blocks[static_cast<size_t>(GeometryKind::spheres)]);
+}
 
 class Collapser {
 public:
@@ -68,6 +83,23 @@ public:
             out_.nodes[index].child[i] = child;
         }
         return {index, deepest + children.count - 1};
+    }
+
+    // What `write` would append, of jobs nothing.
+    Size size_of(const Subtree& subtree) const {
+        const WideChildren children = plan_ ? plan_->children_of(subtree) : balanced_children(tree_, subtree);
+        Size size{1, {0, 0}};
+        for (uint32_t i = 0; i < children.count; ++i) {
+            const Subtree& to = children.child[i];
+            if (to.is_leaf()) {
+                const Ref& first = refs_[to.begin];
+                if (first.primitive == k_none) continue;
+                size.blocks[static_cast<size_t>(source_.geometry_of(first).kind)] += blocks_for(to.size());
+            } else if (to.size() >= job_size_) {
+                size.add(size_of(to));
+            }
+        }
+        return size;
     }
 
     std::vector<Job> jobs;
@@ -119,18 +151,29 @@ WideTree collapse(const BinaryTree& tree, std::span<const Ref> refs, const LeafS
     const auto plan = rule ? std::make_unique<Plan>(tree, refs, *rule, pool) : nullptr;
     Collapser top(tree, refs, source, plan.get(), job_size, whole);
     const uint32_t top_need = top.write({tree.box, tree.root, 0, count}).stack_need;
-    std::vector<WideTree> parts(top.jobs.size());
-    pool.run(static_cast<uint32_t>(parts.size()), [&](uint32_t i) {
-        Collapser part(tree, refs, source, plan.get(), 0, parts[i]);
-        parts[i].stack_need = part.write(top.jobs[i].subtree).stack_need;
+    const auto job_count = static_cast<uint32_t>(top.jobs.size());
+    std::vector<Size> sizes(job_count);
+    pool.run(job_count, [&](uint32_t i) {
+        sizes[i] = Collapser(tree, refs, source, plan.get(), 0, whole).size_of(top.jobs[i].subtree);
     });
+    Size size{whole.nodes.size(), {whole.triangle_blocks.size(), whole.sphere_blocks.size()}};
+    for (const Size& part : sizes) size.add(part);
+    reserve(whole, size);
     uint32_t deepest = 0;
-    for (size_t i = 0; i < parts.size(); ++i) {
-        const Job& job = top.jobs[i];
-        const uint32_t root = append(whole, parts[i]);
-        parts[i].nodes = {}, parts[i].triangle_blocks = {}, parts[i].sphere_blocks = {};
-        whole.nodes[job.parent].child[job.slot] = make_child(ChildKind::node, root);
-        deepest = max_of(deepest, parts[i].stack_need);
+    std::vector<WideTree> parts;
+    for (uint32_t begin = 0; begin < job_count; begin += static_cast<uint32_t>(parts.size())) {
+        parts = std::vector<WideTree>(min_of(k_batch * pool.size(), job_count - begin));
+        pool.run(static_cast<uint32_t>(parts.size()), [&](uint32_t i) {
+            reserve(parts[i], sizes[begin + i]);
+            Collapser part(tree, refs, source, plan.get(), 0, parts[i]);
+            parts[i].stack_need = part.write(top.jobs[begin + i].subtree).stack_need;
+        });
+        for (uint32_t i = 0; i < parts.size(); ++i) {
+            const Job& job = top.jobs[begin + i];
+            const uint32_t root = append(whole, parts[i]);
+            whole.nodes[job.parent].child[job.slot] = make_child(ChildKind::node, root);
+            deepest = max_of(deepest, parts[i].stack_need);
+        }
     }
     whole.stack_need = top_need + deepest;
     return whole;

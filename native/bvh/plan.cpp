@@ -18,12 +18,12 @@ float blocks(uint32_t refs) { return static_cast<float>(blocks_for(refs)); }
 
 Subtree left_of(const BinaryTree& tree, const Subtree& subtree) {
     const BinaryNode& node = tree.nodes[subtree.node];
-    return {node.box[0], node.child[0], subtree.begin, subtree.node};
+    return {node.box[0], node.child[0], subtree.begin, node.split};
 }
 
 Subtree right_of(const BinaryTree& tree, const Subtree& subtree) {
     const BinaryNode& node = tree.nodes[subtree.node];
-    return {node.box[1], node.child[1], subtree.node, subtree.end};
+    return {node.box[1], node.child[1], node.split, subtree.end};
 }
 
 Plan::Plan(const BinaryTree& tree, std::span<const Ref> refs, const LeafRule& rule, ThreadPool& pool)

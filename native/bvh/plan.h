@@ -55,7 +55,7 @@ private:
     const BinaryTree& tree_;
     std::span<const Ref> refs_;
     const LeafRule& rule_;
-    std::vector<Choice> choices_;  // by node
+    LazyArray<Choice> choices_;  // by node
 };
 
 // The two sides of a node.

@@ -125,6 +125,7 @@ private:
 
     // How much a cut promises: 0 for what cannot be cut.
     float priority_of(const Ref& ref) const {
+        if (!(ref.box().half_area() > tolerated_waste_)) return 0;  // most are done with here
         if (ref.primitive == k_none || source_.geometry_of(ref).kind != GeometryKind::mesh) return 0;
         const Plane plane = halving_.plane_of(ref.box());
         if (plane.axis == k_none) return 0;

@@ -40,15 +40,21 @@ LampTree build_lamp_tree(const std::vector<Light>& lights, std::vector<uint32_t>
     for (const Ref& ref : refs) result.lights.push_back(ref.primitive);
     result.root = tree.root;
     result.nodes.resize(tree.nodes.size());
-    // Node i parts refs [begin, end) at i; at some indices there is none.
-    for (uint32_t i = 0; i < tree.nodes.size(); ++i) {
-        const BinaryNode& from = tree.nodes[i];
-        if (from.begin == from.end) continue;
-        LampNode& to = result.nodes[i];
-        const uint32_t begin[2] = {from.begin, i}, end[2] = {i, from.end};
+    struct Part {
+        uint32_t node, begin, end;
+    };
+    std::vector<Part> left{{tree.root, 0, static_cast<uint32_t>(refs.size())}};
+    while (!left.empty()) {
+        const Part part = left.back();
+        left.pop_back();
+        const BinaryNode& from = tree.nodes[part.node];
+        LampNode& to = result.nodes[part.node];
+        const uint32_t begin[2] = {part.begin, from.split}, end[2] = {from.split, part.end};
         for (uint32_t side = 0; side < 2; ++side) {
             to.low[side] = from.box[side].low, to.high[side] = from.box[side].high;
-            to.child[side] = from.child[side] == k_leaf_flag ? make_leaf(begin[side], end[side]) : from.child[side];
+            const bool is_leaf = from.child[side] == k_leaf_flag;
+            to.child[side] = is_leaf ? make_leaf(begin[side], end[side]) : from.child[side];
+            if (!is_leaf) left.push_back({from.child[side], begin[side], end[side]});
         }
     }
     return result;

@@ -14,6 +14,7 @@ COMMANDS = {
     "paper": "the experiment of Celestino et al. 2014: its Figure 3, SSIM over time, path lengths at equal time",
     "peers": "beside Cycles, Mitsuba and LuxCore, each in its own process, at equal time",
     "denoised": "time to an SSIM with Open Image Denoise, beside Cycles",
+    "start": "from Blender's scene to the first iteration: time and memory beside Cycles",
     "growth": "time and memory as triangles, lights, pixels and threads grow",
 }
 FAILED, INTERRUPTED = 1, 130

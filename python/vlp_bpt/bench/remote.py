@@ -7,6 +7,7 @@ import os
 import sys
 import time
 import traceback
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
@@ -102,11 +103,44 @@ class Remote(Contestant):
         return answer
 
 
-def _serve(inner: Contestant, pipe: Connection) -> None:
-    """The other process: does what it is asked until it is told to end or nobody is there."""
+def apart(what: str, work: Callable[..., Any], *args: Any) -> Any:
+    """What `work(*args)` returns in a process of its own. Raises Error where that fails or ends; `what` it was."""
+    context = multiprocessing.get_context("spawn")
+    mine, other = context.Pipe()
+    process = context.Process(target=_work, args=(other, work, *args), daemon=True)
+    process.start()
+    other.close()
+    try:
+        kind, answer = mine.recv()
+    except EOFError:
+        process.join()
+        raise Error(f"{what}: its process ended, exit code {process.exitcode}") from None
+    process.join()
+    if kind == "error":
+        raise Error(f"{what}: {answer}")
+    return answer
+
+
+def _work(pipe: Connection, work: Callable[..., Any], *args: Any) -> None:
+    _settle_in()
+    try:
+        pipe.send(("answer", work(*args)))
+    except Exception as error:
+        words = str(error) if isinstance(error, Error) else traceback.format_exception_only(error)[-1].strip()
+        pipe.send(("error", words))
+    os._exit(0)  # as in _serve
+
+
+def _settle_in() -> None:
+    """First of all in a new process."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # renderers talk
     # A parent that has loaded bpy hands on the folder of Blender's own scripts, in which there is another bpy.
     sys.path[:] = [folder for folder in sys.path if not (Path(folder) / "bpy_extras").is_dir()]
+
+
+def _serve(inner: Contestant, pipe: Connection) -> None:
+    """The other process: does what it is asked until it is told to end or nobody is there."""
+    _settle_in()
     state = State()
     with suppress(EOFError, KeyboardInterrupt):
         while (command := pipe.recv())[0] != "end":
