@@ -59,9 +59,10 @@ class NoiseMeter:
     """Watches the mean of a render that goes on, to stop it at `threshold`; at 0 it does nothing.
 
     The mean m of n iterations is made of that of the first k, m_k, and that of the other n - k. These are independent,
-    so (m_k - m) sqrt(k / (n - k)) has the variance of m; where adaptive sampling makes later iterations less noisy than
-    earlier ones, that holds for k = n / 2, and is a little too much for other k. For normal noise its mean size is that of the error; where
-    rare bright specks are still missing from both, it is less, in caustics down to two thirds.
+    so (m_k - m) sqrt(k / (n - k)) has the variance of m; where adaptive sampling makes later iterations less noisy
+    than earlier ones, that holds for k = n / 2, and is a little too much for other k. For normal noise its mean size
+    is that of the error; where rare bright specks are still missing from both, it is less, in caustics down to two
+    thirds.
 
     Two luminances are kept, the last of those of 8, 16, 32 ... iterations: 8 bytes a pixel.
 

@@ -120,11 +120,12 @@ class RenderSettings:
     `vlp_bpt.noise` says, is as low as that, if `samples` and `time_limit` do not end it before; 0 for none.
     light_path_length: L, most surface hits of a light path. eye_path_length: K, most surface hits of an eye path.
     light_paths: N, light paths of one iteration (0: chosen from the picture's size). vlp_connections: C, virtual light
-    points joined to one eye vertex. vlp_candidates: M, how many each of them is chosen from, by the light that it would
-    bring if nothing stood between. light_samples: S, light samples at one eye vertex. splats: light paths are joined to
-    the lens. roulette: paths end at random, the dimmer the sooner, and those that go on make up for it; else all of
-    them go on up to L and K. adaptive: from the ninth iteration on, iterations take more samples in pixels that are
-    noisier and fewer in others, one a pixel on average; without bias (native/film/sample_rates.h). hits: eye paths that meet a light count.
+    points joined to one eye vertex. vlp_candidates: M, how many each of them is chosen from, by the light that it
+    would bring if nothing stood between. light_samples: S, light samples at one eye vertex. splats: light paths are
+    joined to the lens. roulette: paths end at random, the dimmer the sooner, and those that go on make up for it; else
+    all of them go on up to L and K. adaptive: from the ninth iteration on, iterations take more samples in pixels that
+    are noisier and fewer in others, one a pixel on average; without bias (native/film/sample_rates.h). hits: eye paths
+    that meet a light count.
     clamp_direct, clamp_indirect: the most that one find of light after at most one surface, or after more, may add to
     a pixel (mean of its channels); 0: no limit. Clamping removes bright specks and the light in them: it is a bias.
     denoise: the finished picture is denoised by Open Image Denoise, guided by colours and normals that the eye paths

@@ -114,8 +114,8 @@ class Builder:
 
 
 def settings(**values: Any) -> RenderSettings:
-    """Few and fixed, for tests: one thread for each of the two processors, a box filter, as many samples everywhere: then
-    means of pixels are nearly normal."""
+    """Few and fixed, for tests: one thread for each of the two processors, a box filter; as many samples everywhere,
+    so that means of pixels are nearly normal."""
     defaults: dict[str, Any] = {
         "samples": 16, "light_path_length": 3, "eye_path_length": 5, "light_paths": 256, "vlp_connections": 1,
         "light_samples": 1, "adaptive": False, "filter": "BOX", "filter_width": 1.0, "threads": 2,
