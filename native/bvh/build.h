@@ -17,7 +17,7 @@ struct TreeSpan {
 };
 
 struct Bvh {
-    std::vector<BvhNode> nodes;
+    std::vector<BvhNode> nodes;  // each before its children
     std::vector<TriangleBlock> triangle_blocks;
     std::vector<SphereBlock> sphere_blocks;
     std::vector<uint32_t> instance_roots;

@@ -108,7 +108,8 @@ private:
         const BvhNode& root = bvh_.nodes[bvh_.instance_roots[index]];
         const Box box = instance_box(root, source_.instances[index].object_to_world);
         if (moved_.of(index)) set_child_box(node, i, widened(box));
-        contents.include(box);
+        contents.box.include(box);
+        contents.area += area_of(child_box(node, i));  // of what has not moved as it was
     }
 
     Bvh& bvh_;

@@ -39,7 +39,7 @@ struct Corners {
 Corners corners_of(const GeometryView& geometry, const InstanceView* placement, uint32_t primitive);
 Sphere sphere_of(const GeometryView& geometry, const InstanceView* placement, uint32_t primitive);
 
-// Of a whole primitive.
+// Of a whole primitive; from these functions alone, for the same reason.
 Box box_of(const Corners& corners);
 Box box_of(const Sphere& sphere);
 

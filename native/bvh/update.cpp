@@ -106,15 +106,16 @@ void update_bvh(Bvh& bvh, std::span<const GeometryView> geometries, std::span<co
         bvh = build_bvh(geometries, instances, pool);
         return;
     }
-    Updater updater(bvh, geometries, instances, max_growth, pool);
-    for (size_t g = 0; g < geometries.size(); ++g) {
-        if (moved.geometries[g]) updater.update_geometry(g);
-    }
     std::vector<uint8_t> in_world(instances.size());
     for (size_t i = 0; i < instances.size(); ++i) {
         in_world[i] = moved.instances[i] | moved.geometries[instances[i].geometry];
     }
-    if (std::ranges::find(in_world, 1) != in_world.end()) updater.update_world(in_world);
+    if (std::ranges::find(in_world, 1) == in_world.end()) return;
+    Updater updater(bvh, geometries, instances, max_growth, pool);
+    for (size_t g = 0; g < geometries.size(); ++g) {
+        if (moved.geometries[g]) updater.update_geometry(g);
+    }
+    updater.update_world(in_world);
 }
 
 }  // namespace vlp

@@ -1,6 +1,7 @@
 // A hierarchy whose primitives have moved finds what one built anew finds, and covers them as well.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <functional>
 
@@ -34,6 +35,14 @@ Bvh build_anew(const RayScene& scene) {
 template <typename T>
 bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
     return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+}
+
+// But for the padding behind children.
+bool same_bits(const std::vector<BvhNode>& a, const std::vector<BvhNode>& b) {
+    return std::ranges::equal(a, b, [](const BvhNode& x, const BvhNode& y) {
+        return std::memcmp(x.bounds, y.bounds, sizeof x.bounds) == 0 &&
+               std::memcmp(x.child, y.child, sizeof x.child) == 0;
+    });
 }
 
 // Bits, for blocks have NaN in empty lanes.
@@ -122,6 +131,17 @@ Ray random_ray(const RayScene& scene, std::mt19937& random, float size) {
     return ray;
 }
 
+// Rays that lie in the plane of such a triangle may meet it beside its box, which trees hide from each other.
+bool has_no_area(const RayScene& scene, const Hit& hit) {
+    if (!hit.found()) return false;
+    const InstanceView& instance = scene.instances[hit.instance];
+    const GeometryView& geometry = scene.geometries[instance.geometry];
+    if (geometry.kind != GeometryKind::mesh) return false;
+    const Corners c = corners_of(geometry, &instance, hit.primitive);
+    const Vec3 a = c.v[1] - c.v[0], b = c.v[2] - c.v[0];
+    return length(cross(a, b)) <= 1e-5f * (length_squared(a) + length_squared(b));
+}
+
 // The same distances to the last bit, and the same primitives but where two are equally far.
 void expect_same_hits(const RayScene& scene, float size, int rays, uint32_t seed) {
     std::mt19937 random(seed);
@@ -132,6 +152,7 @@ void expect_same_hits(const RayScene& scene, float size, int rays, uint32_t seed
     for (int i = 0; i < rays; ++i) {
         const Ray ray = random_ray(scene, random, size);
         const Hit hit = closest_hit(view, ray, {}), other = closest_hit(expected, ray, {});
+        if (has_no_area(scene, hit) || has_no_area(scene, other)) continue;
         SCOPED_TRACE(testing::Message() << "seed " << seed << ", ray " << i);
         ASSERT_EQ(hit.t, other.t);
         if (hit.instance != other.instance || hit.primitive != other.primitive) {
@@ -314,6 +335,15 @@ TEST(BvhRefit, PartsCoverTheirTrianglesAfterManySteps) {
     expect_same_hits(scene, 1.5f, 5000, 58);
 }
 
+TEST(BvhRefit, PartsStayParts) {
+    RayScene scene;
+    scene.place(scene.add(make_boards(2000, 7)));
+    scene.build();
+    scene.deform(0, [](Vec3 p) { return transform_point(turned(0.1f * p.z), p); });
+    update(scene, everything(scene), 1.1);
+    EXPECT_TRUE(scene.bvh.built_costs[0].has_value()) << "costs hardly more than before";
+}
+
 TEST(BvhRefit, BuildsAnewWhatTheRuleSays) {
     RayScene scene = crowd();
     scene.build();
@@ -383,6 +413,12 @@ TEST(BvhRefit, InstancesThatScatterLeaveTheirTreesAlone) {
     update(scene, moved, k_max_growth);
     EXPECT_FALSE(scene.bvh.built_costs[0].has_value());
     expect_same(scene.bvh, build_anew(scene));
+    // While what they place shrinks, and so do its boxes.
+    scene.deform(ball, [](Vec3 p) { return p * 0.01f; });
+    for (uint32_t i = 0; i < 400; ++i) scene.move(i, scaled(0.3f, 0.3f, 0.3f, random_point(random, 10)));
+    update(scene, everything(scene), k_max_growth);
+    EXPECT_TRUE(scene.bvh.built_costs[1].has_value());
+    EXPECT_FALSE(scene.bvh.built_costs[0].has_value());
 }
 
 TEST(BvhRefit, SpheresThatBecomeEllipsoidsStandApart) {
