@@ -50,7 +50,7 @@ TEST(BvhMovedPart, TwoCoverTheTriangle) {
         Corners from, to;
         for (Vec3& v : from.v) v = random_point(random, 1);
         for (Vec3& v : to.v) v = random_point(random, 1);
-        const uint32_t axis = random() % 3, flat = (axis + 1) % 3;
+        const auto axis = static_cast<uint32_t>(random() % 3), flat = (axis + 1) % 3;
         if (i % 4 == 1) {
             for (Vec3& v : from.v) (&v.x)[flat] = (&from.v[0].x)[flat];
         } else if (i % 4 == 2) {

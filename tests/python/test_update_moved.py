@@ -32,7 +32,7 @@ def ball(name: str, rings: int, radius: float) -> Mesh:
 
 
 def crowd() -> Scene:
-    """Placed once and shared, mirrored, cut, round and shining things; some that are empty, which the core never sees."""
+    """Placed once and shared, mirrored, cut, round and shining things; some are empty: the core never sees them."""
     random = np.random.default_rng(5)
     scene = room(24, 16)
     middle = random.uniform(-0.8, 0.8, (200, 1, 3))
@@ -168,7 +168,7 @@ def test_what_cannot_be_rendered_is_refused_by_name() -> None:
     positions = mesh.positions
     mesh.positions = positions.copy()
     mesh.positions[7, 1] = np.nan
-    with pytest.raises(SceneError, match="mesh 'ball': positions: vertex 7 is .* must be finite"):
+    with pytest.raises(SceneError, match=r"mesh 'ball': positions: vertex 7 is .* must be finite"):
         renderer.update(scene)
     mesh.positions = positions
     scene.instances[2].transform = np.zeros((3, 4), np.float32)
