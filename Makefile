@@ -97,6 +97,15 @@ bench-rays: build ## rays a second, beside Embree's where its headers are (Debia
 	build/venv/vlp_rays $(RAYS_ARGS)
 	build/venv/vlp_ray_visits
 
+.PHONY: bench-refit
+bench-refit: build ## what it takes that hierarchies follow edits, and how rays fare afterwards
+	@$(BIN)/cmake -DVLP_BENCH=ON build/venv >build/configure.log || { cat build/configure.log >&2; exit 1; }
+	@$(BIN)/cmake --build build/venv --target vlp_refit
+	build/venv/vlp_refit
+	mkdir -p out; [ -e out/million.blend ] || $(PY) scenes/million.py --output out/million.blend
+	[ -e out/million.vlp.npz ] || .venv/bin/vlp-bpt export out/million.blend -o out/million.vlp.npz
+	$(PY) native/bench/updates.py out/million.vlp.npz
+
 .PHONY: extension
 extension: wheel ## dist/vlp_bpt-VERSION-PLATFORM.zip, to be installed in Blender
 	$(PY) addon/build_extension.py dist/vlp_bpt-$(VERSION)-cp311-abi3-*.whl --output dist

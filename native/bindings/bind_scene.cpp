@@ -226,6 +226,24 @@ void bind_scene(nb::module_& m) {
         .def(
             "reopen", [](Scene& s, bool materials, bool lamps, bool world) { s.reopen({materials, lamps, world}); },
             nb::arg("materials"), nb::arg("lamps"), nb::arg("world"))
+        .def(
+            "move_mesh",
+            [](Scene& s, uint32_t geometry, Triples positions, std::optional<CornerNormals> corner_normals,
+               std::optional<CornerUvs> uvs, std::optional<Ints> material_index) {
+                s.move_mesh(geometry, span_of<Vec3>(positions), span_of<Vec3>(corner_normals), span_of<Vec2>(uvs),
+                            span_of<int32_t>(material_index));
+            },
+            nb::arg("geometry"), nb::arg("positions"), nb::arg("corner_normals").none(), nb::arg("uvs").none(),
+            nb::arg("material_index").none())
+        .def(
+            "move_spheres",
+            [](Scene& s, uint32_t geometry, Triples centers, Floats radii, std::optional<Ints> material_index) {
+                s.move_spheres(geometry, span_of<Vec3>(centers), span_of<float>(radii),
+                               span_of<int32_t>(material_index));
+            },
+            nb::arg("geometry"), nb::arg("centers"), nb::arg("radii"), nb::arg("material_index").none())
+        .def("move_instance", [](Scene& s, uint32_t instance,
+                                 FloatMatrix transform) { s.move_instance(instance, affine_of(transform)); })
         .def("build", &Scene::build, nb::arg("threads") = 0, nb::call_guard<nb::gil_scoped_release>())
         .def("intersect", &intersect_rays, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))
         .def("occluded", &occluded_rays, nb::arg("origins"), nb::arg("directions"), nb::arg("t_max"))

@@ -4,7 +4,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "bvh/node_box.h"
 #include "bvh/presplit.h"
+#include "bvh/trees.h"
 
 namespace vlp {
 
@@ -17,7 +19,7 @@ constexpr uint32_t k_tree_stack = k_stack_size / 2 - 1;  // the other half is fo
 WideTree build_tree(std::vector<Ref>& refs, const LeafSource& source, const uint8_t* kinds, ThreadPool& pool) {
     if (refs.size() >= 1u << k_child_index_bits) throw std::length_error("Too many primitives for one scene");
     presplit(refs, source, pool);
-    const LeafRule rule{k_block_width, 0.6f, kinds};  // the plan makes larger leaves where they pay
+    const LeafRule rule{k_block_width, k_block_cost, kinds};  // the plan makes larger leaves where they pay
     WideTree tree = collapse(build_binary(refs, rule, 64, pool), refs, source, &rule, pool);
     if (tree.stack_need > k_tree_stack) {  // shapes whose sizes grow exponentially
         tree = collapse(build_binary(refs, rule, 0, pool), refs, source, nullptr, pool);
@@ -25,7 +27,43 @@ WideTree build_tree(std::vector<Ref>& refs, const LeafSource& source, const uint
     return tree;
 }
 
-// Which instances stand in the world's tree as primitives.
+// Trees of the geometries that some instance keeps apart.
+std::vector<WideTree> build_geometry_trees(std::span<const GeometryView> geometries,
+                                           std::span<const InstanceView> instances,
+                                           const std::vector<uint8_t>& flattened, ThreadPool& pool) {
+    std::vector<uint8_t> wanted(geometries.size());
+    for (size_t i = 0; i < instances.size(); ++i) wanted[instances[i].geometry] |= !flattened[i];
+    std::vector<WideTree> trees(geometries.size());
+    const auto build = [&](size_t g, ThreadPool& threads) {
+        trees[g] = build_geometry_tree(geometries, instances, g, threads);
+    };
+    const auto is_small = [&](size_t g) { return geometries[g].primitive_count < k_small_geometry; };
+    pool.run(static_cast<uint32_t>(geometries.size()), [&](uint32_t g) {
+        ThreadPool alone(1);
+        if (wanted[g] && is_small(g)) build(g, alone);
+    });
+    for (size_t g = 0; g < geometries.size(); ++g) {
+        if (wanted[g] && !is_small(g)) build(g, pool);
+    }
+    return trees;
+}
+
+TreeSpan end_of(const WideTree& tree) {
+    return {static_cast<uint32_t>(tree.nodes.size()), static_cast<uint32_t>(tree.triangle_blocks.size()),
+            static_cast<uint32_t>(tree.sphere_blocks.size())};
+}
+
+}  // namespace
+
+BvhView Bvh::view() const {
+    return {nodes.data(), triangle_blocks.data(), sphere_blocks.data(), instance_roots.data(), root};
+}
+
+size_t Bvh::bytes() const {
+    return nodes.size() * sizeof(BvhNode) + triangle_blocks.size() * sizeof(TriangleBlock) +
+           sphere_blocks.size() * sizeof(SphereBlock) + instance_roots.size() * sizeof(uint32_t);
+}
+
 std::vector<uint8_t> choose_flattened(std::span<const GeometryView> geometries,
                                       std::span<const InstanceView> instances) {
     std::vector<uint32_t> placements(geometries.size());
@@ -40,55 +78,15 @@ std::vector<uint8_t> choose_flattened(std::span<const GeometryView> geometries,
     return flattened;
 }
 
-// Trees of the geometries that some instance keeps apart.
-std::vector<WideTree> build_geometry_trees(std::span<const GeometryView> geometries,
-                                           std::span<const InstanceView> instances,
-                                           const std::vector<uint8_t>& flattened, ThreadPool& pool) {
-    std::vector<uint8_t> wanted(geometries.size());
-    for (size_t i = 0; i < instances.size(); ++i) wanted[instances[i].geometry] |= !flattened[i];
-    std::vector<WideTree> trees(geometries.size());
-    const auto build = [&](size_t g, ThreadPool& threads) {
-        std::vector<Ref> refs;
-        append_refs(geometries[g], nullptr, k_none, threads, refs);
-        trees[g] = build_tree(refs, {geometries, instances, &geometries[g]}, nullptr, threads);
-    };
-    const auto is_small = [&](size_t g) { return geometries[g].primitive_count < k_small_geometry; };
-    pool.run(static_cast<uint32_t>(geometries.size()), [&](uint32_t g) {
-        ThreadPool alone(1);
-        if (wanted[g] && is_small(g)) build(g, alone);
-    });
-    for (size_t g = 0; g < geometries.size(); ++g) {
-        if (wanted[g] && !is_small(g)) build(g, pool);
-    }
-    return trees;
+WideTree build_geometry_tree(std::span<const GeometryView> geometries, std::span<const InstanceView> instances,
+                             size_t geometry, ThreadPool& pool) {
+    std::vector<Ref> refs;
+    append_refs(geometries[geometry], nullptr, k_none, pool, refs);
+    return build_tree(refs, {geometries, instances, &geometries[geometry]}, nullptr, pool);
 }
 
-// Of an instance: around the boxes of its tree's first level, which is tighter than around the root's box.
-Box instance_box(const WideTree& tree, const Affine& object_to_world) {
-    Box box;
-    const BvhNode& root = tree.nodes.front();
-    for (uint32_t i = 0; i < k_node_width; ++i) {
-        if (root.child[i] == k_none) continue;
-        const auto& b = root.bounds;
-        box.include(transform_box(object_to_world, {{b[0][i], b[1][i], b[2][i]}, {b[3][i], b[4][i], b[5][i]}}));
-    }
-    return box;
-}
-
-}  // namespace
-
-BvhView Bvh::view() const {
-    return {nodes.data(), triangle_blocks.data(), sphere_blocks.data(), instance_roots.data(), root};
-}
-
-size_t Bvh::bytes() const {
-    return nodes.size() * sizeof(BvhNode) + triangle_blocks.size() * sizeof(TriangleBlock) +
-           sphere_blocks.size() * sizeof(SphereBlock) + instance_roots.size() * sizeof(uint32_t);
-}
-
-Bvh build_bvh(std::span<const GeometryView> geometries, std::span<const InstanceView> instances, ThreadPool& pool) {
-    const std::vector<uint8_t> flattened = choose_flattened(geometries, instances);
-    std::vector<WideTree> trees = build_geometry_trees(geometries, instances, flattened, pool);
+WideTree build_world_tree(std::span<const GeometryView> geometries, std::span<const InstanceView> instances,
+                          std::span<const uint8_t> flattened, std::span<const BvhNode* const> roots, ThreadPool& pool) {
     size_t count = 0;
     for (size_t i = 0; i < instances.size(); ++i) {
         count += flattened[i] ? geometries[instances[i].geometry].primitive_count : 1;
@@ -102,33 +100,59 @@ Bvh build_bvh(std::span<const GeometryView> geometries, std::span<const Instance
         kinds[i] = static_cast<uint8_t>(geometry.kind);
         if (flattened[i]) {
             append_refs(geometry, &instance, static_cast<uint32_t>(i), pool, refs);
-        } else if (!trees[instance.geometry].nodes.empty()) {
-            const Box box = instance_box(trees[instance.geometry], instance.object_to_world);
+        } else if (roots[instance.geometry]) {
+            const Box box = instance_box(*roots[instance.geometry], instance.object_to_world);
             refs.push_back({box.low, static_cast<uint32_t>(i), box.high, k_none});
         }
     }
-    WideTree world = build_tree(refs, {geometries, instances, nullptr}, kinds.data(), pool);
+    return build_tree(refs, {geometries, instances, nullptr}, kinds.data(), pool);
+}
+
+Box instance_box(const BvhNode& root, const Affine& object_to_world) {
+    Box box;
+    for (uint32_t i = 0; i < k_node_width; ++i) {
+        if (root.child[i] != k_none) box.include(transform_box(object_to_world, child_box(root, i)));
+    }
+    return box;
+}
+
+void check_size(const Bvh& bvh) {
+    constexpr size_t k_most = size_t{1} << k_child_index_bits;
+    if (bvh.nodes.size() >= k_most || bvh.triangle_blocks.size() >= k_most || bvh.sphere_blocks.size() >= k_most) {
+        throw std::length_error("Too many primitives for one scene");
+    }
+}
+
+Bvh build_bvh(std::span<const GeometryView> geometries, std::span<const InstanceView> instances, ThreadPool& pool) {
     Bvh bvh;
-    bvh.instance_roots.assign(instances.size(), k_none);
+    bvh.flattened = choose_flattened(geometries, instances);
+    std::vector<WideTree> trees = build_geometry_trees(geometries, instances, bvh.flattened, pool);
+    std::vector<const BvhNode*> root_nodes(geometries.size());
+    for (size_t g = 0; g < geometries.size(); ++g) {
+        if (!trees[g].nodes.empty()) root_nodes[g] = trees[g].nodes.data();
+    }
+    WideTree world = build_world_tree(geometries, instances, bvh.flattened, root_nodes, pool);
     if (!world.nodes.empty()) {
         bvh.root = 0;
         bvh.low = world.box.low, bvh.high = world.box.high;
     }
+    bvh.trees.emplace_back();
     std::vector<uint32_t> roots(geometries.size(), k_none);
     for (size_t g = 0; g < geometries.size(); ++g) {
+        bvh.trees.push_back(end_of(world));
         if (!trees[g].nodes.empty()) roots[g] = append(world, trees[g]);
         trees[g] = {};
     }
-    if (world.nodes.size() >= 1u << k_child_index_bits || world.triangle_blocks.size() >= 1u << k_child_index_bits ||
-        world.sphere_blocks.size() >= 1u << k_child_index_bits) {
-        throw std::length_error("Too many primitives for one scene");
-    }
+    bvh.trees.push_back(end_of(world));
+    bvh.built_costs.resize(1 + geometries.size());
+    bvh.instance_roots.assign(instances.size(), k_none);
     for (size_t i = 0; i < instances.size(); ++i) {
-        if (!flattened[i]) bvh.instance_roots[i] = roots[instances[i].geometry];
+        if (!bvh.flattened[i]) bvh.instance_roots[i] = roots[instances[i].geometry];
     }
     bvh.nodes = std::move(world.nodes);
     bvh.triangle_blocks = std::move(world.triangle_blocks);
     bvh.sphere_blocks = std::move(world.sphere_blocks);
+    check_size(bvh);
     return bvh;
 }
 

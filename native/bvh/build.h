@@ -1,6 +1,7 @@
 // Builds the acceleration structure of a scene.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,14 +11,25 @@
 
 namespace vlp {
 
+// Where a tree's part of each array begins.
+struct TreeSpan {
+    uint32_t node = 0, triangle_block = 0, sphere_block = 0;
+};
+
 struct Bvh {
-    std::vector<BvhNode> nodes;
+    std::vector<BvhNode> nodes;  // each before its children
     std::vector<TriangleBlock> triangle_blocks;
     std::vector<SphereBlock> sphere_blocks;
     std::vector<uint32_t> instance_roots;
     uint32_t root = k_none;
     Vec3 low, high;  // bounds of every surface in world space; both 0 in an empty scene
 
+    // For updates, which need to know what stands where: the world's tree, one for each geometry (often none), the end.
+    std::vector<TreeSpan> trees;
+    std::vector<uint8_t> flattened;  // by instance: its primitives are in the world's tree
+    std::vector<std::optional<double>> built_costs;  // of the trees, see Refitted; told by the first update
+
+    bool is_empty(size_t tree) const { return trees[tree].node == trees[tree + 1].node; }
     BvhView view() const;
     size_t bytes() const;
 };

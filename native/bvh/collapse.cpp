@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "bvh/node_box.h"
 #include "bvh/pack.h"
 
 namespace vlp {
@@ -69,7 +70,7 @@ public:
         for (uint32_t i = 0; i < k_node_width; ++i) {
             const bool there = i < children.count;
             const Subtree& to = children.child[i];
-            set_bounds(out_.nodes[index], i, there ? widened(to.box) : Box{});
+            set_child_box(out_.nodes[index], i, there ? widened(to.box) : Box{});
             uint32_t child = k_none;
             if (there && to.is_leaf()) {
                 child = pack_leaf(refs_.subspan(to.begin, to.size()), source_, out_);
@@ -105,18 +106,6 @@ public:
     std::vector<Job> jobs;
 
 private:
-    static Box widened(const Box& box) {
-        const auto margin = [](Vec3 v) { return Vec3{std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)} * k_box_margin; };
-        return {box.low - margin(box.low), box.high + margin(box.high)};
-    }
-
-    static void set_bounds(BvhNode& node, uint32_t i, const Box& box) {
-        for (uint32_t axis = 0; axis < 3; ++axis) {
-            node.bounds[axis][i] = (&box.low.x)[axis];
-            node.bounds[axis + 3][i] = (&box.high.x)[axis];
-        }
-    }
-
     const BinaryTree& tree_;
     std::span<const Ref> refs_;
     const LeafSource& source_;

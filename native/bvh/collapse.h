@@ -29,6 +29,9 @@ struct LeafSource {
     Corners corners_of(const Ref& ref) const {
         return vlp::corners_of(geometry_of(ref), placement_of(ref), ref.primitive);
     }
+    Sphere sphere_of(const Ref& ref) const {
+        return vlp::sphere_of(geometry_of(ref), placement_of(ref), ref.primitive);
+    }
 };
 
 // `rule`: by the cheapest plan; null: opens the child with the most refs first, which bounds the depth.

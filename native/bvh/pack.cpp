@@ -9,6 +9,8 @@ namespace {
 
 constexpr float k_nan = std::numeric_limits<float>::quiet_NaN();
 
+}  // namespace
+
 void set_lane(TriangleBlock& block, uint32_t lane, const Corners& corners, const Ref& ref) {
     for (uint32_t vertex = 0; vertex < 3; ++vertex) {
         for (uint32_t axis = 0; axis < 3; ++axis) block.vertex[vertex][axis][lane] = (&corners.v[vertex].x)[axis];
@@ -22,7 +24,17 @@ void set_lane(SphereBlock& block, uint32_t lane, const Sphere& sphere, const Ref
     block.instance[lane] = ref.instance, block.primitive[lane] = ref.primitive;
 }
 
-}  // namespace
+Corners in_lane(const TriangleBlock& block, uint32_t lane) {
+    Corners corners;
+    for (uint32_t vertex = 0; vertex < 3; ++vertex) {
+        for (uint32_t axis = 0; axis < 3; ++axis) (&corners.v[vertex].x)[axis] = block.vertex[vertex][axis][lane];
+    }
+    return corners;
+}
+
+Sphere in_lane(const SphereBlock& block, uint32_t lane) {
+    return {{block.center[0][lane], block.center[1][lane], block.center[2][lane]}, block.radius[lane]};
+}
 
 uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree& out) {
     const Ref& first = refs.front();
@@ -51,8 +63,7 @@ uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree
             set_lane(block, i % k_block_width, Sphere{{}, k_nan}, Ref{{}, k_none, {}, k_none});
         } else {
             const Ref& ref = refs[i];
-            set_lane(block, i % k_block_width,
-                     sphere_of(source.geometry_of(ref), source.placement_of(ref), ref.primitive), ref);
+            set_lane(block, i % k_block_width, source.sphere_of(ref), ref);
         }
     }
     return make_child(ChildKind::spheres, index, blocks);

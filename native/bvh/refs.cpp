@@ -28,6 +28,16 @@ __attribute__((noinline)) Sphere sphere_of(const GeometryView& geometry, const I
     return {transform_point(placement->object_to_world, sphere.center), sphere.radius * scale};
 }
 
+Box box_of(const Corners& c) {
+    return {min_of(min_of(c.v[0], c.v[1]), c.v[2]), max_of(max_of(c.v[0], c.v[1]), c.v[2])};
+}
+
+__attribute__((noinline)) Box box_of(const Sphere& s) {
+    // A quarter of a millionth wider: the sphere test rounds the centre's distance, not the box's sides.
+    const float r = s.radius * (1.0f + 0x1p-22f);
+    return {s.center - Vec3{r, r, r}, s.center + Vec3{r, r, r}};
+}
+
 bool can_flatten(const GeometryView& geometry, const InstanceView& placement) {
     if (geometry.kind == GeometryKind::mesh) return true;
     const Affine& map = placement.object_to_world;
@@ -55,17 +65,9 @@ void append_refs(const GeometryView& geometry, const InstanceView* placement, ui
     pool.run(chunks, [&](uint32_t chunk) {
         const uint32_t end = min_of(geometry.primitive_count, (chunk + 1) * k_chunk);
         for (uint32_t i = chunk * k_chunk; i < end; ++i) {
-            Vec3 low, high;
-            if (geometry.kind == GeometryKind::mesh) {
-                const Corners c = corners_of(geometry, placement, i);
-                low = min_of(min_of(c.v[0], c.v[1]), c.v[2]), high = max_of(max_of(c.v[0], c.v[1]), c.v[2]);
-            } else {
-                const Sphere s = sphere_of(geometry, placement, i);
-                // A quarter of a millionth wider: the sphere test rounds the centre's distance, not the box's sides.
-                const float r = s.radius * (1.0f + 0x1p-22f);
-                low = s.center - Vec3{r, r, r}, high = s.center + Vec3{r, r, r};
-            }
-            out[i] = {low, instance, high, i};
+            const Box box = geometry.kind == GeometryKind::mesh ? box_of(corners_of(geometry, placement, i))
+                                                                : box_of(sphere_of(geometry, placement, i));
+            out[i] = {box.low, instance, box.high, i};
         }
     });
 }

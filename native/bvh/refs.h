@@ -39,6 +39,10 @@ struct Corners {
 Corners corners_of(const GeometryView& geometry, const InstanceView* placement, uint32_t primitive);
 Sphere sphere_of(const GeometryView& geometry, const InstanceView* placement, uint32_t primitive);
 
+// Of a whole primitive; from these functions alone, for the same reason.
+Box box_of(const Corners& corners);
+Box box_of(const Sphere& sphere);
+
 // Whether the instance's primitives can stand in the world's tree: spheres must stay spheres.
 bool can_flatten(const GeometryView& geometry, const InstanceView& placement);
 

@@ -2,59 +2,18 @@
 #include "scene/scene.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "bsdf/albedo_tables.h"
 #include "film/filter_tables.h"
-#include "geometry/octahedral.h"
 #include "light/light.h"
 #include "scene/input_checks.h"
 
 namespace vlp {
 namespace {
-
-std::vector<uint16_t> narrow(std::span<const int32_t> slots) {
-    std::vector<uint16_t> narrowed(slots.size());
-    for (size_t i = 0; i < slots.size(); ++i) narrowed[i] = static_cast<uint16_t>(slots[i]);
-    return narrowed;
-}
-
-// Where a copy of the vector's elements stands; null when it is empty.
-template <typename T>
-const T* placed(const std::vector<T>& v, ScenePart part, const Scene::Place& place) {
-    return v.empty() ? nullptr : static_cast<const T*>(place(part, v.data(), v.size() * sizeof(T)));
-}
-
-const void* in_place(ScenePart, const void* data, size_t) { return data; }
-
-uint64_t next_revision() {
-    static std::atomic<uint64_t> last{0};
-    return ++last;
-}
-
-bool equal(OctNormal a, OctNormal b) { return a.bits == b.bits; }
-bool equal(Vec2 a, Vec2 b) { return a.x == b.x && a.y == b.y; }
-
-// Smooth meshes say the same at every corner of a vertex, and take a sixth of the room with one value for each. Fills
-// `of_vertex` with these, or returns false where corners of a vertex differ or that would take more.
-template <typename T>
-bool by_vertex(std::span<const T> of_corner, std::span<const Triangle> triangles, size_t vertices,
-               std::vector<T>& of_vertex) {
-    if (of_corner.size() <= vertices) return false;
-    std::vector<T> values(vertices);
-    std::vector<bool> known(vertices);
-    for (size_t i = 0; i < of_corner.size(); ++i) {
-        const uint32_t v = triangles[i / 3].v[i % 3];
-        if (known[v] && !equal(values[v], of_corner[i])) return false;
-        values[v] = of_corner[i];
-        known[v] = true;
-    }
-    of_vertex = std::move(values);
-    return true;
-}
 
 // The factor of a transform that scales every direction alike; 0 when it does not.
 float uniform_scale(const Affine& a) {
@@ -69,22 +28,6 @@ float uniform_scale(const Affine& a) {
 
 }  // namespace
 
-GeometryView Scene::Geometry::view(const Place& place) const {
-    GeometryView v;
-    v.kind = kind;
-    v.primitive_count = static_cast<uint32_t>(kind == GeometryKind::mesh ? triangles.size() : spheres.size());
-    const auto put = [&](const auto& array) { return placed(array, ScenePart::geometry, place); };
-    v.positions = put(positions);
-    v.triangles = put(triangles);
-    v.corner_normals = put(corner_normals);
-    v.uvs = put(uvs);
-    v.normals_by_vertex = normals_by_vertex;
-    v.uvs_by_vertex = uvs_by_vertex;
-    v.spheres = put(spheres);
-    v.material_slots = put(slots);
-    return v;
-}
-
 void Scene::require_open(bool part) const {
     if (built_ || !part) throw std::logic_error("scene: nothing can be added or built again after build()");
 }
@@ -93,34 +36,14 @@ uint32_t Scene::add_mesh(std::span<const Vec3> positions, std::span<const Triang
                          std::span<const Vec3> corner_normals, std::span<const Vec2> uvs,
                          std::span<const int32_t> slots) {
     require_open(geometry_open_);
-    check_mesh(positions, triangles, corner_normals, uvs, slots);
-    Geometry g;
-    g.positions.assign(positions.begin(), positions.end());
-    g.triangles.assign(triangles.begin(), triangles.end());
-    std::vector<OctNormal> normals(corner_normals.size());
-    for (size_t i = 0; i < normals.size(); ++i) {
-        const float l = length(corner_normals[i]);
-        normals[i] = encode(l > 0 ? corner_normals[i] / l : Vec3{0, 0, 1});
-    }
-    g.normals_by_vertex = by_vertex<OctNormal>(normals, triangles, positions.size(), g.corner_normals);
-    if (!g.normals_by_vertex) g.corner_normals = std::move(normals);
-    g.uvs_by_vertex = by_vertex<Vec2>(uvs, triangles, positions.size(), g.uvs);
-    if (!g.uvs_by_vertex) g.uvs.assign(uvs.begin(), uvs.end());
-    g.slots = narrow(slots);
-    geometries_.push_back(std::move(g));
+    geometries_.push_back(make_mesh(positions, triangles, corner_normals, uvs, slots));
     return static_cast<uint32_t>(geometries_.size() - 1);
 }
 
 uint32_t Scene::add_spheres(std::span<const Vec3> centers, std::span<const float> radii,
                             std::span<const int32_t> slots) {
     require_open(geometry_open_);
-    check_spheres(centers, radii, slots);
-    Geometry g;
-    g.kind = GeometryKind::spheres;
-    g.spheres.resize(centers.size());
-    for (size_t i = 0; i < centers.size(); ++i) g.spheres[i] = {centers[i], radii[i]};
-    g.slots = narrow(slots);
-    geometries_.push_back(std::move(g));
+    geometries_.push_back(make_spheres(centers, radii, slots));
     return static_cast<uint32_t>(geometries_.size() - 1);
 }
 
@@ -141,13 +64,11 @@ void Scene::add_instance(uint32_t geometry, const Affine& object_to_world, std::
                                     std::to_string(geometries_.size()) + " geometries, and one material is the least");
     }
     InstanceView instance;
-    instance.object_to_world = object_to_world;
-    instance.world_to_object = inverse(object_to_world);
+    place(instance, object_to_world);
     instance.geometry = geometry;
     instance.first_material = static_cast<uint32_t>(material_of_slot_.size());
     instance.slot_count = static_cast<uint32_t>(materials.size());
     instance.visibility = visibility;
-    instance.mirrored = determinant(object_to_world) < 0;
     for (const int32_t m : materials) material_of_slot_.push_back(static_cast<uint32_t>(m));
     instances_.push_back(instance);
 }
@@ -191,37 +112,22 @@ void Scene::set_film(uint32_t width, uint32_t height, Window window, bool transp
     transparent_film_ = transparent;
 }
 
-void Scene::reopen(Opened parts) {
-    if (!built_) throw std::logic_error("scene: reopen() before build()");
-    built_ = false;
-    open_ = parts;
-    if (parts.materials) {
-        materials_.clear();
-        lobes_.clear();
-    }
-    if (parts.lamps) {
-        lights_.clear();
-        info_.lamps = 0;
-    }
-    if (parts.world) {
-        world_ = {};
-        world_texels_.clear();
-        world_tables_ = {};
-        world_view_ = {};
-    }
-}
-
 void Scene::build(unsigned threads) {
     require_open(true);
     const auto start = std::chrono::steady_clock::now();
     ThreadPool pool(threads);
     check_material_indices();
-    if (geometry_open_) build_surfaces(pool);
+    if (geometry_open_) {
+        build_surfaces(pool);
+    } else {
+        move_surfaces(pool);
+    }
     build_lights(pool);
     if (open_.materials) revisions_[ScenePart::materials] = next_revision();
     if (open_.world) revisions_[ScenePart::world] = next_revision();
     geometry_open_ = false;
     open_ = {};
+    moved_ = {std::vector<uint8_t>(geometries_.size()), std::vector<uint8_t>(instances_.size())};
 
     view_ = view_placed(in_place);
     view_.geometries = geometry_views_.data();  // the passes' own copy, which lives as long as the scene
@@ -246,9 +152,10 @@ void Scene::build_lights(ThreadPool& pool) {
     for (const uint32_t m : material_of_slot_) emissions.push_back(materials_[m].emission);
     const auto equal = [](Rgb a, Rgb b) { return a.r == b.r && a.g == b.g && a.b == b.b; };
     const bool same_emitters = !geometry_open_ && std::ranges::equal(emissions, built_emissions_, equal);
-    if (same_emitters && !open_.lamps && !open_.world) return;
+    // Light from infinity comes through the bounds.
+    const bool moves_infinite = bound() && std::ranges::any_of(lights_, is_infinite);
+    if (same_emitters && !open_.lamps && !open_.world && !moves_infinite && !moves_emitters()) return;
     lights_.resize(info_.lamps);  // without what the last build added
-    bound();
     if (!is_black(world_)) {
         lights_.push_back(make_environment(world_));
         lights_.back().visibility = k_visible_to_camera;
@@ -313,34 +220,37 @@ ByPart<size_t> Scene::bytes(size_t alignment) const {
     return bytes;
 }
 
-// A sphere around every surface and lamp, so that light from infinity reaches all of it.
-void Scene::bound() {
+// A sphere around every surface and lamp, so that light from infinity reaches all of it. Whether it is another than before.
+bool Scene::bound() {
     const bool no_surface = bvh_.root == k_none;
     Vec3 low = no_surface ? Vec3{k_infinity, k_infinity, k_infinity} : bvh_.low;
     Vec3 high = no_surface ? -low : bvh_.high;
-    for (const Light& lamp : lights_) {
+    for (const Light& lamp : std::span(lights_).first(info_.lamps)) {
         if (is_infinite(lamp)) continue;
         const float reach = lamp.radius + length(lamp.axis_u) + length(lamp.axis_v);
         low = min_of(low, lamp.position - Vec3{reach, reach, reach});
         high = max_of(high, lamp.position + Vec3{reach, reach, reach});
     }
-    center_ = {}, radius_ = 1;
-    if (!(low.x <= high.x)) return;
-    center_ = (low + high) * 0.5f;
-    radius_ = max_of(length(high - low) * 0.5f * 1.0001f, 1e-6f);
+    const Vec3 center = std::exchange(center_, {});
+    const float radius = std::exchange(radius_, 1.0f);
+    if (low.x <= high.x) {
+        center_ = (low + high) * 0.5f;
+        radius_ = max_of(length(high - low) * 0.5f * 1.0001f, 1e-6f);
+    }
+    return !(center_ == center) || radius_ != radius;
+}
+
+bool Scene::emits(const InstanceView& instance) const {
+    const std::span materials = std::span(material_of_slot_).subspan(instance.first_material, instance.slot_count);
+    return std::ranges::any_of(materials, [&](uint32_t m) { return !is_black(materials_[m].emission); });
 }
 
 void Scene::collect_emitters() {
     light_of_primitive_.clear();
     info_.emitters = 0;
     for (uint32_t i = 0; i < instances_.size(); ++i) {
-        InstanceView& instance = instances_[i];
-        instance.first_emitter = k_none;
-        for (uint32_t slot = 0; slot < instance.slot_count; ++slot) {
-            if (is_black(materials_[material_of_slot_[instance.first_material + slot]].emission)) continue;
-            add_emitters_of(i);
-            break;
-        }
+        instances_[i].first_emitter = k_none;
+        if (emits(instances_[i])) add_emitters_of(i);
     }
 }
 

@@ -1,34 +1,20 @@
 // The scene that owns its data: filled datablock by datablock, built once, then read by the passes as a SceneView.
 #pragma once
 
-#include <array>
-#include <functional>
 #include <span>
 #include <vector>
 
-#include "bvh/build.h"
+#include "bvh/update.h"
 #include "core/parallel.h"
 #include "film/film.h"
 #include "light/lamp_tree_build.h"
 #include "light/light_build.h"
+#include "scene/geometry_build.h"
 #include "scene/material_build.h"
+#include "scene/scene_parts.h"
 #include "scene/scene_view.h"
 
 namespace vlp {
-
-// What of a scene changes apart from the rest, and takes memory on a device. The camera and the film take none.
-enum class ScenePart : uint8_t { geometry, bvh, instances, materials, lights, world, tables };
-inline constexpr std::array<const char*, 7> k_scene_part_names{"geometry", "bvh",   "instances", "materials",
-                                                               "lights",   "world", "tables"};
-
-// A number for each part of a scene.
-template <typename T>
-struct ByPart {
-    std::array<T, k_scene_part_names.size()> of{};
-
-    T& operator[](ScenePart part) { return of[static_cast<size_t>(part)]; }
-    const T& operator[](ScenePart part) const { return of[static_cast<size_t>(part)]; }
-};
 
 class Scene {
 public:
@@ -61,10 +47,17 @@ public:
     // After `build`: takes parts out, to be added anew before the next `build`, which makes only what depends on them. No
     // view of the scene may be used until then, nor by a renderer's helper (Renderer::rest). There must be a material for each that instances have.
     void reopen(Opened parts);
+    // After `reopen`, for what stays: other shapes of as many vertices or spheres, and other places. The tree follows, or is
+    // built anew where that pays. Throw as those that add something, and std::invalid_argument for what is not there.
+    void move_mesh(uint32_t geometry, std::span<const Vec3> positions, std::span<const Vec3> corner_normals,
+                   std::span<const Vec2> uvs, std::span<const int32_t> slots);
+    void move_spheres(uint32_t geometry, std::span<const Vec3> centers, std::span<const float> radii,
+                      std::span<const int32_t> slots);
+    void move_instance(uint32_t instance, const Affine& object_to_world);
 
     const SceneView& view() const { return view_; }
     // The same with every array where `place(part, data, bytes)` says that a copy of it stands: how a GPU gets the scene.
-    using Place = std::function<const void*(ScenePart part, const void* data, size_t bytes)>;
+    using Place = vlp::Place;
     SceneView view_placed(const Place& place) const;
     // Changes with what is in the part, and is another for each scene.
     uint64_t revision(ScenePart part) const { return revisions_[part]; }
@@ -82,24 +75,15 @@ public:
     const Info& info() const { return info_; }
 
 private:
-    struct Geometry {
-        GeometryKind kind = GeometryKind::mesh;
-        std::vector<Vec3> positions;
-        std::vector<Triangle> triangles;
-        std::vector<OctNormal> corner_normals;
-        std::vector<Vec2> uvs;
-        bool normals_by_vertex = false, uvs_by_vertex = false;
-        std::vector<Sphere> spheres;
-        std::vector<uint16_t> slots;
-
-        GeometryView view(const Place& place) const;
-    };
-
     void require_open(bool part) const;
+    Geometry& movable(uint32_t geometry, GeometryKind kind, size_t vertices_or_spheres);
     void build_surfaces(ThreadPool& pool);
+    void move_surfaces(ThreadPool& pool);
+    bool moves_emitters() const;
     void build_lights(ThreadPool& pool);  // the lamps are there; adds what else shines
     void check_material_indices() const;
-    void bound();
+    bool bound();
+    bool emits(const InstanceView& instance) const;
     void collect_emitters();
     void make_light_tables(ThreadPool& pool);
     void add_emitters_of(uint32_t instance);
@@ -123,6 +107,7 @@ private:
     bool transparent_film_ = false, built_ = false;
     bool geometry_open_ = true;
     Opened open_{true, true, true};
+    Moved moved_;  // since the last build
     std::vector<Rgb> built_emissions_;  // of the instances' materials, as the table of lights has them
     ByPart<uint64_t> revisions_;
     Bvh bvh_;

@@ -54,6 +54,12 @@ struct InstanceView {
     bool mirrored = false;        // the transform turns the winding of triangles over
 };
 
+inline void place(InstanceView& instance, const Affine& object_to_world) {
+    instance.object_to_world = object_to_world;
+    instance.world_to_object = inverse(object_to_world);
+    instance.mirrored = determinant(object_to_world) < 0;
+}
+
 struct SceneView {
     const GeometryView* geometries = nullptr;
     const InstanceView* instances = nullptr;

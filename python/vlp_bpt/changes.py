@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from .scene import Scene
+from .scene import Instance, Mesh, Scene, Spheres
 
 
 @dataclass(frozen=True)
@@ -19,16 +20,43 @@ class Changes:
     materials: bool = True
     lamps: bool = True
     world: bool = True
+    # Where geometry is not made anew: indices of what has other vertices or spheres, but as many, and other transforms.
+    moved_geometries: tuple[int, ...] = ()
+    moved_instances: tuple[int, ...] = ()
 
 
 def changes(old: Scene, new: Scene) -> Changes:
     """What `new` has else than `old`. Arrays are the same where they are equal."""
+    geometries = _moved(old.geometries, new.geometries, _is_moved_geometry)
+    instances = _moved(old.instances, new.instances, _is_moved_instance)
+    anew = geometries is None or instances is None
     return Changes(
-        geometry=not (same(old.geometries, new.geometries) and same(old.instances, new.instances)),
+        geometry=anew,
         materials=not same(old.materials, new.materials),
         lamps=not same(old.lights, new.lights),
         world=not same(old.world, new.world),
+        moved_geometries=() if anew else geometries or (),
+        moved_instances=() if anew else instances or (),
     )
+
+
+def _moved(old: list[Any], new: list[Any], is_moved: Callable[[Any, Any], bool]) -> tuple[int, ...] | None:
+    """Which have moved; None where something has changed otherwise."""
+    if len(old) != len(new):
+        return None
+    different = [i for i, (a, b) in enumerate(zip(old, new, strict=True)) if not same(a, b)]
+    return tuple(different) if all(is_moved(old[i], new[i]) for i in different) else None
+
+
+def _is_moved_geometry(a: Mesh | Spheres, b: Mesh | Spheres) -> bool:
+    """Whether the trees over both may be the same but for boxes."""
+    if isinstance(a, Mesh) and isinstance(b, Mesh):
+        return len(a.positions) == len(b.positions) and same(a.triangles, b.triangles)
+    return isinstance(a, Spheres) and isinstance(b, Spheres) and len(a.centers) == len(b.centers)
+
+
+def _is_moved_instance(a: Instance, b: Instance) -> bool:
+    return same(replace(a, transform=b.transform), b)
 
 
 def kept(value: Any) -> Any:

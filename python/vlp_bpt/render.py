@@ -114,13 +114,14 @@ class Renderer:
         """Begins anew with another scene, other settings or both, at `first_iteration`.
 
         What is the same is neither built nor uploaded again: after another camera nothing, after another material the
-        materials, after other geometry or instances everything. The scene may be the one of before with other fields;
+        materials, after other positions, radii or transforms of as many what has moved, and the hierarchy follows;
+        after other geometry or instances everything. The scene may be the one of before with other fields;
         an array whose elements were changed in place goes unnoticed. Waits for an iteration under way. When it raises,
         the next `update` must bring what can be rendered.
         """
         new_scene = scene if scene is not None else self._known
         changed = changes(self._known, new_scene)
-        warnings = validate(new_scene, geometry_is_known=not changed.geometry)
+        warnings = validate(new_scene, new_geometries=None if changed.geometry else changed.moved_geometries)
         asked = settings or self._asked
         new_settings = self._checked(asked, new_scene, self.first_iteration)
         if new_settings.denoise:

@@ -28,8 +28,9 @@ def upload(scene: Scene, native_scene: Any) -> None:
 
 
 def upload_changes(scene: Scene, changed: Changes, native_scene: Any) -> None:
-    """Makes a built native scene hold `scene`, whose geometry is the same; it must be built again."""
+    """Makes a built native scene hold `scene`, whose geometry is the same or moved; it must be built again."""
     native_scene.reopen(changed.materials, changed.lamps, changed.world)
+    _move(scene, changed, native_scene)
     if changed.materials:
         for material in scene.materials:
             _add_material(material, native_scene)
@@ -39,6 +40,25 @@ def upload_changes(scene: Scene, changed: Changes, native_scene: Any) -> None:
     if changed.world:
         _set_world(scene.world, native_scene)
     _set_view(scene, native_scene)
+
+
+def _move(scene: Scene, changed: Changes, native_scene: Any) -> None:
+    """Those without primitives were left out: the native scene counts without them."""
+    if not (changed.moved_geometries or changed.moved_instances):
+        return
+    there = [_primitives(geometry) > 0 for geometry in scene.geometries]
+    placed = [there[instance.geometry] for instance in scene.instances]
+    index, place = np.cumsum(there) - 1, np.cumsum(placed) - 1
+    for i in changed.moved_geometries:
+        if there[i]:
+            _move_geometry(scene.geometries[i], int(index[i]), native_scene)
+    for i in changed.moved_instances:
+        if placed[i]:
+            native_scene.move_instance(int(place[i]), scene.instances[i].transform)
+
+
+def _primitives(geometry: Mesh | Spheres) -> int:
+    return len(geometry.centers if isinstance(geometry, Spheres) else geometry.triangles)
 
 
 def _set_view(scene: Scene, native_scene: Any) -> None:
@@ -62,15 +82,21 @@ def _rgb(color: tuple[float, float, float]) -> tuple[float, float, float]:
 
 
 def _add_geometry(geometry: Mesh | Spheres, native_scene: Any) -> int | None:
-    if isinstance(geometry, Spheres):
-        if len(geometry.centers) == 0:
-            return None
-        return int(native_scene.add_spheres(geometry.centers, geometry.radii, geometry.material_index))
-    if len(geometry.triangles) == 0:
+    if _primitives(geometry) == 0:
         return None
+    if isinstance(geometry, Spheres):
+        return int(native_scene.add_spheres(geometry.centers, geometry.radii, geometry.material_index))
     uvs = next(iter(geometry.uvs.values()), None)
     args = (geometry.positions, geometry.triangles, geometry.corner_normals, uvs, geometry.material_index)
     return int(native_scene.add_mesh(*args))
+
+
+def _move_geometry(geometry: Mesh | Spheres, index: int, native_scene: Any) -> None:
+    if isinstance(geometry, Spheres):
+        native_scene.move_spheres(index, geometry.centers, geometry.radii, geometry.material_index)
+    else:
+        uvs = next(iter(geometry.uvs.values()), None)
+        native_scene.move_mesh(index, geometry.positions, geometry.corner_normals, uvs, geometry.material_index)
 
 
 def _add_material(material: Material, native_scene: Any) -> None:

@@ -39,10 +39,11 @@ _MOST_COORDINATE = 1e18  # squares of distances must not overflow float32
 _LEAST_DETERMINANT, _MOST_DETERMINANT = 1e-36, 1e36
 
 
-def validate(scene: Scene, *, geometry_is_known: bool = False) -> list[str]:
-    """Returns warnings; raises SceneError. See `Scene.validate`. `geometry_is_known`: arrays were checked before."""
+def validate(scene: Scene, *, new_geometries: Iterable[int] | None = None) -> list[str]:
+    """Returns warnings; raises SceneError. See `Scene.validate`. `new_geometries`: the arrays of others were checked
+    before."""
     warnings: list[str] = []
-    for geometry in () if geometry_is_known else scene.geometries:
+    for geometry in scene.geometries if new_geometries is None else [scene.geometries[i] for i in new_geometries]:
         if isinstance(geometry, Mesh):
             _check_mesh(geometry)
         else:

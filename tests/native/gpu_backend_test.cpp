@@ -380,6 +380,17 @@ TEST_F(GpuUpdate, OfSettingsUploadsNothing) {
     expect_same_sums(render.renderer->film().sums(), film.sums());
 }
 
+TEST_F(GpuUpdate, OfAMovedMeshUploadsGeometryAndTree) {
+    Mesh floor = quad({-1, -1, 0.1f}, {1, -1, 0}, {1, 1, 0.1f}, {-1, 1, 0});
+    const uint64_t uploaded = update({}, [&](Scene& s) { s.move_mesh(0, floor.positions, {}, {}, {}); });
+    EXPECT_EQ(uploaded, bytes_of({ScenePart::geometry, ScenePart::bvh}));
+}
+
+TEST_F(GpuUpdate, OfAMovedInstanceUploadsInstancesAndTree) {
+    const auto change = [](Scene& s) { s.move_instance(10, placed_at({0.1f, 0, 0})); };
+    EXPECT_EQ(update({}, change), bytes_of({ScenePart::instances, ScenePart::bvh}));
+}
+
 TEST_F(GpuUpdate, OfAMaterialUploadsMaterialsAlone) {
     const auto change = [](Scene& s) {
         add_materials(s);

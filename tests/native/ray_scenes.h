@@ -98,6 +98,21 @@ public:
         ThreadPool pool(threads);
         bvh = build_bvh(geometries, instances, pool);
     }
+    // Moves the vertices of a mesh.
+    template <typename Map>
+    void deform(uint32_t geometry, const Map& map) {
+        for (Mesh& mesh : meshes_) {
+            if (mesh.positions.data() != geometries[geometry].positions) continue;
+            for (Vec3& p : mesh.positions) p = map(p);
+        }
+    }
+    std::vector<Sphere>& spheres_of(uint32_t geometry) {
+        for (std::vector<Sphere>& spheres : spheres_) {
+            if (spheres.data() == geometries[geometry].spheres) return spheres;
+        }
+        return spheres_.front();
+    }
+    void move(uint32_t instance, const Affine& object_to_world) { vlp::place(instances[instance], object_to_world); }
     SceneView view() const {
         SceneView scene;
         scene.geometries = geometries.data(), scene.instances = instances.data();

@@ -12,7 +12,7 @@ from small_scenes import room
 
 from vlp_bpt import Device, Mode, Renderer, RenderSettings, SceneError
 from vlp_bpt.changes import Changes, changes, kept
-from vlp_bpt.scene import Instance, Lobe, LobeKind, Material, PointLight, Scene, World
+from vlp_bpt.scene import Instance, Lobe, LobeKind, Material, PointLight, Scene, Visibility, World
 
 SETTINGS = RenderSettings(samples=8, device=Device.CPU, threads=1)
 
@@ -57,6 +57,36 @@ def move_vertices(scene: Scene) -> None:
     mesh.positions = mesh.positions * np.float32(0.9)
 
 
+def move_everything(scene: Scene) -> None:
+    move_instance(scene)
+    move_vertices(scene)
+    paint(scene)
+    add_lamp(scene)
+
+
+def fewer_triangles(scene: Scene) -> None:
+    mesh: Any = scene.geometries[0]
+    mesh.triangles = mesh.triangles[:-1]
+
+
+def another_vertex(scene: Scene) -> None:
+    mesh: Any = scene.geometries[0]
+    mesh.positions = np.concatenate([mesh.positions, mesh.positions[:1]])
+
+
+def turn_triangles(scene: Scene) -> None:
+    mesh: Any = scene.geometries[0]
+    mesh.triangles = np.ascontiguousarray(mesh.triangles[:, ::-1])
+
+
+def place_again(scene: Scene) -> None:
+    scene.instances.append(replace(scene.instances[0], transform=scene.instances[0].transform * np.float32(0.5)))
+
+
+def hide(scene: Scene) -> None:
+    scene.instances[0].visibility = Visibility(0)
+
+
 NOTHING = Changes(geometry=False, materials=False, lamps=False, world=False)
 EDITS: list[tuple[Callable[[Scene], None], Changes]] = [
     (paint, replace(NOTHING, materials=True)),
@@ -66,8 +96,14 @@ EDITS: list[tuple[Callable[[Scene], None], Changes]] = [
     (remove_lamps, replace(NOTHING, lamps=True, world=True)),
     (turn_camera, NOTHING),
     (enlarge, NOTHING),
-    (move_instance, replace(NOTHING, geometry=True)),
-    (move_vertices, replace(NOTHING, geometry=True)),
+    (move_instance, replace(NOTHING, moved_instances=(0,))),
+    (move_vertices, replace(NOTHING, moved_geometries=(0,))),
+    (move_everything, replace(NOTHING, moved_geometries=(0,), moved_instances=(0,), materials=True, lamps=True)),
+    (fewer_triangles, replace(NOTHING, geometry=True)),
+    (another_vertex, replace(NOTHING, geometry=True)),
+    (turn_triangles, replace(NOTHING, geometry=True)),
+    (place_again, replace(NOTHING, geometry=True)),
+    (hide, replace(NOTHING, geometry=True)),
 ]
 
 
