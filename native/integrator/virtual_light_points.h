@@ -34,7 +34,8 @@ VLP_HD inline SurfacePoint surface_of(const LightVertex& vlp) {
     SurfacePoint p{};
     p.position = vlp.position;
     p.geometric_normal = decode(vlp.geometric_normal);
-    p.shading_normal = decode(vlp.shading_normal);
+    const bool flat = vlp.shading_normal.bits == vlp.geometric_normal.bits;
+    p.shading_normal = flat ? p.geometric_normal : decode(vlp.shading_normal);
     p.material = vlp.material();
     p.instance = vlp.instance;
     p.primitive = vlp.primitive;
