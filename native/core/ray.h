@@ -17,8 +17,8 @@ struct Ray {
 VLP_HD inline Vec3 offset_origin(Vec3 p, Vec3 n) {
     constexpr float k_near_zero = 1.0f / 32.0f, k_small_step = 1.0f / 65536.0f, k_ulps = 256.0f;
     const auto step = [&](float x, float nx) {
-        const int32_t ulps = static_cast<int32_t>(k_ulps * nx);
-        const float moved = float_of(bits_of(x) + (x < 0 ? -ulps : ulps));
+        const int32_t ulps = static_cast<int32_t>(std::copysign(k_ulps, x) * nx);  // away from 0, whichever side
+        const float moved = float_of(bits_of(x) + ulps);
         return std::fabs(x) < k_near_zero ? x + k_small_step * nx : moved;
     };
     return {step(p.x, n.x), step(p.y, n.y), step(p.z, n.z)};

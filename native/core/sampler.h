@@ -10,10 +10,17 @@ VLP_HD inline uint32_t reverse_bits(uint32_t x) {
 #if VLP_ON_DEVICE
     return __brev(x);
 #else
-    x = __builtin_bswap32(x);
-    x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
+    x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
     x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
-    return ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
+#if defined(__SSE2__) && !defined(__SSSE3__)
+    // These vectors can't shuffle bytes: an order that compilers don't take for a byte swap, or loops stay scalar.
+    x = ((x >> 8) & 0x00ff00ffu) | ((x & 0x00ff00ffu) << 8);
+    x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
+    return (x >> 16) | (x << 16);
+#else
+    x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
+    return __builtin_bswap32(x);
+#endif
 #endif
 }
 
@@ -41,31 +48,61 @@ VLP_HD constexpr uint32_t sobol_second_reversed(uint32_t index) {
 // In [0, 1): the upper 24 bits, so that the largest is 1 - 2^-24.
 VLP_HD constexpr float unit_float(uint32_t x) { return static_cast<float>(x >> 8) * 0x1p-24f; }
 
-// The numbers of one path. Each draw takes the next pair of dimensions of a (0, 2)-sequence whose order is shuffled
-// anew by (seed, dimension), so that any 2^k successive indices are stratified in each draw and draws are independent.
+// One draw: two numbers, as bits.
+struct SamplePair {
+    uint32_t x, y;
+};
+
+// Each draw takes the next pair of dimensions of a (0, 2)-sequence whose order is shuffled anew by (seed, dimension), so
+// that any 2^k successive indices are stratified in each draw and draws are independent. `index` is bit-reversed.
+VLP_HD inline SamplePair sample_pair(uint32_t seed, uint32_t index, uint32_t dimension) {
+    const uint32_t key = hash(seed, dimension);
+    const uint32_t shuffled = reverse_bits(scramble_reversed(index, key));
+    return {reverse_bits(scramble_reversed(shuffled, key * 0x9e3779b1u + 0x7f4a7c15u)),
+            reverse_bits(scramble_reversed(sobol_second_reversed(shuffled), key * 0x85ebca77u + 0xc2b2ae3du))};
+}
+
+// The numbers of one path. A host computes the draws of a block of dimensions at once, in the lanes of its vectors, when
+// one of them is asked for: most of what a step of a walk draws lies in one block.
 struct Sampler {
+    static constexpr uint32_t k_block = 8;
+
     uint32_t seed = 0;  // of the pixel or of the set of light paths
     uint32_t index = 0;  // of the path in its sequence, bit-reversed
     uint32_t dimension = 0;  // of the next draw
 
-    VLP_HD uint32_t next_bits() {
-        const uint32_t key = hash(seed, dimension++);
-        const uint32_t shuffled = reverse_bits(scramble_reversed(index, key));
-        return reverse_bits(scramble_reversed(shuffled, key * 0x9e3779b1u + 0x7f4a7c15u));
-    }
-
+    VLP_HD uint32_t next_bits() { return next_pair().x; }
     VLP_HD float next() { return unit_float(next_bits()); }
-
     VLP_HD Vec2 next_2d() {
-        const uint32_t key = hash(seed, dimension++);
-        const uint32_t shuffled = reverse_bits(scramble_reversed(index, key));
-        const uint32_t x = reverse_bits(scramble_reversed(shuffled, key * 0x9e3779b1u + 0x7f4a7c15u));
-        const uint32_t y =
-            reverse_bits(scramble_reversed(sobol_second_reversed(shuffled), key * 0x85ebca77u + 0xc2b2ae3du));
-        return {unit_float(x), unit_float(y)};
+        const SamplePair pair = next_pair();
+        return {unit_float(pair.x), unit_float(pair.y)};
     }
+
+private:
+    VLP_HD SamplePair next_pair() {
+        const uint32_t d = dimension++;
+        if constexpr (VLP_ON_DEVICE) return sample_pair(seed, index, d);
+        if (d / k_block != block_) compute_block(d / k_block);
+        return {x_[d % k_block], y_[d % k_block]};
+    }
+
+    VLP_HD void compute_block(uint32_t block) {
+        block_ = block;
+        for (uint32_t i = 0; i < k_block; ++i) {
+            const SamplePair pair = sample_pair(seed, index, block * k_block + i);
+            x_[i] = pair.x, y_[i] = pair.y;
+        }
+    }
+
+    uint32_t block_ = k_none;  // whose draws are in x_ and y_
+    uint32_t x_[k_block], y_[k_block];
 };
 
-VLP_HD inline Sampler make_sampler(uint32_t seed, uint32_t index) { return {seed, reverse_bits(index), 0}; }
+VLP_HD inline Sampler make_sampler(uint32_t seed, uint32_t index) {
+    Sampler sampler;
+    sampler.seed = seed;
+    sampler.index = reverse_bits(index);
+    return sampler;
+}
 
 }  // namespace vlp

@@ -86,12 +86,11 @@ VLP_HD VLP_FORCE_INLINE Step walk(const SceneView& scene, Ray ray, PrimitiveId s
     return step;
 }
 
-// What passes through transparent surfaces on the way along `ray`; black when something blocks it. A ray `to_camera` is
-// not blocked by what the camera does not see.
-VLP_HD inline Rgb transmittance(const SceneView& scene, Ray ray, PrimitiveId from, PrimitiveId to,
-                                bool to_camera = false) {
-    if (!scene.has_transparency && !(to_camera && scene.hides_from_camera))
-        return find_any(scene, ray, from, to) ? Rgb{} : rgb(1);
+namespace detail {
+
+// Of scenes where a surface may not block all of a ray.
+VLP_HD inline Rgb transmittance_of_surfaces(const SceneView& scene, Ray ray, PrimitiveId from, PrimitiveId to,
+                                            bool to_camera) {
     Rgb through = rgb(1);
     PrimitiveId skip = from;
     for (int i = 0; i < k_max_transparent; ++i) {
@@ -112,9 +111,20 @@ VLP_HD inline Rgb transmittance(const SceneView& scene, Ray ray, PrimitiveId fro
     return {};
 }
 
+}  // namespace detail
+
+// What passes through transparent surfaces on the way along `ray`; black when something blocks it. A ray `to_camera` is
+// not blocked by what the camera does not see.
+VLP_HD inline Rgb transmittance(const SceneView& scene, const Ray& ray, PrimitiveId from, PrimitiveId to,
+                                bool to_camera = false) {
+    if (scene.has_transparency || (to_camera && scene.hides_from_camera))
+        return detail::transmittance_of_surfaces(scene, ray, from, to, to_camera);
+    return find_any(scene, ray, from, to) ? Rgb{} : rgb(1);
+}
+
 // Geometry of a connection of two points, and what of the light between them gets through.
 struct Edge {
-    Vec3 direction;       // unit, from the first to the second
+    Vec3 direction;  // unit, from the first to the second
     float dist_squared = 0;
 };
 

@@ -25,15 +25,24 @@ VLP_HD inline Rgb area_emitted(const Light& light, Vec3 direction) {
     return light.radiance * area_spread(light, direction);
 }
 
-// Sine of the widest angle that light leaves at.
-VLP_HD inline float area_sin_max(const Light& light) { return 1 / std::sqrt(1 + square(light.spread)); }
+// Square of the sine of the widest angle that light leaves at.
+VLP_HD inline float area_sin_squared(const Light& light) { return 1 / (1 + square(light.spread)); }
+
+// The point of the lamp's plane that lies so far from the centre, along the sides.
+VLP_HD inline Vec3 area_point(const Light& light, Vec2 p) {
+    return light.position + light.axis_u * p.x + light.axis_v * p.y;
+}
+
+VLP_HD inline bool is_in_ellipse(const Light& light, Vec2 p) {
+    return square(p.x / light.half_size.x) + square(p.y / light.half_size.y) <= 1;
+}
 
 VLP_HD inline Emission area_sample_emission(const Light& light, Vec2 u_position, Vec2 u_direction) {
     const Vec2 p = light.ellipse ? sample_disc(u_position) : Vec2{2 * u_position.x - 1, 2 * u_position.y - 1};
-    const float sin_max = area_sin_max(light), projected_angle = k_pi * square(sin_max);
-    const Vec3 local = sample_cosine(u_direction, sin_max);
+    const float sin_squared = area_sin_squared(light), projected_angle = k_pi * sin_squared;
+    const Vec3 local = sample_cosine(u_direction, std::sqrt(sin_squared));
     Emission e;
-    e.position = light.position + light.axis_u * p.x + light.axis_v * p.y;
+    e.position = area_point(light, {p.x * light.half_size.x, p.y * light.half_size.y});
     e.normal = light.normal;
     e.direction = make_frame(light.normal).to_world(local);
     e.pdf_position = 1 / light.area;
@@ -43,9 +52,10 @@ VLP_HD inline Emission area_sample_emission(const Light& light, Vec2 u_position,
 }
 
 VLP_HD inline EmissionPdf area_pdf_emission(const Light& light, Vec3 direction) {
-    const float cosine = dot(light.normal, direction), sin_max = area_sin_max(light);
-    if (cosine <= 0 || length(cross(light.normal, direction)) > sin_max) return {};
-    return {1 / light.area, cosine * k_inv_pi / square(sin_max)};
+    const float cosine = dot(light.normal, direction), sin_squared = area_sin_squared(light);
+    if (cosine <= 0) return {};
+    if (light.spread > 0 && length_squared(cross(light.normal, direction)) > sin_squared) return {};
+    return {1 / light.area, cosine * k_inv_pi / sin_squared};
 }
 
 // What next event draws from for one receiver: the part of the rectangle around the lamp that may shine on it, by solid
@@ -54,8 +64,8 @@ enum class AreaDraw : uint8_t { nothing, ellipse, rectangle, solid_angle };
 
 struct AreaAspect {
     AreaDraw draw = AreaDraw::nothing;
-    Vec3 x, y;  // unit axes of the lamp
-    Vec2 half, foot;  // half its sides; the receiver's foot on its plane, from the centre
+    Vec2 foot;  // the receiver's foot on the lamp's plane, from the centre
+    float reach = 0;  // no light comes from farther away on the plane
     SeenRectangle seen;  // around the foot
     SphericalRectangle spherical;
 };
@@ -68,13 +78,11 @@ VLP_HD inline AreaAspect area_aspect(const Light& light, Vec3 receiver) {
     const Vec3 from_light = receiver - light.position;
     const float height = dot(from_light, light.normal);
     if (!(height > 0)) return a;
-    a.half = {length(light.axis_u), length(light.axis_v)};
-    a.x = light.axis_u / a.half.x;
-    a.y = light.axis_v / a.half.y;
-    a.foot = {dot(from_light, a.x), dot(from_light, a.y)};
-    const float reach = height / light.spread;  // no light comes from farther away on the plane
-    a.seen.low = {max_of(-a.half.x - a.foot.x, -reach), max_of(-a.half.y - a.foot.y, -reach)};
-    a.seen.high = {min_of(a.half.x - a.foot.x, reach), min_of(a.half.y - a.foot.y, reach)};
+    const Vec2 half = light.half_size;
+    a.foot = {dot(from_light, light.axis_u), dot(from_light, light.axis_v)};
+    a.reach = height / light.spread;
+    a.seen.low = {max_of(-half.x - a.foot.x, -a.reach), max_of(-half.y - a.foot.y, -a.reach)};
+    a.seen.high = {min_of(half.x - a.foot.x, a.reach), min_of(half.y - a.foot.y, a.reach)};
     a.seen.height = height;
     if (!(a.seen.low.x < a.seen.high.x && a.seen.low.y < a.seen.high.y)) return a;
     if (light.ellipse && area(a.seen) >= light.area) {
@@ -104,7 +112,7 @@ VLP_HD inline NextEvent area_sample_next_event(const Light& light, Vec3 receiver
             return e;
         case AreaDraw::ellipse: {
             const Vec2 disc = sample_disc(u);
-            p = {disc.x * a.half.x - a.foot.x, disc.y * a.half.y - a.foot.y};
+            p = {disc.x * light.half_size.x - a.foot.x, disc.y * light.half_size.y - a.foot.y};
             break;
         }
         case AreaDraw::rectangle:
@@ -115,9 +123,9 @@ VLP_HD inline NextEvent area_sample_next_event(const Light& light, Vec3 receiver
             break;
     }
     const Vec2 on_lamp = p + a.foot;
-    const bool outside = light.ellipse && square(on_lamp.x / a.half.x) + square(on_lamp.y / a.half.y) > 1;
-    const Vec3 to_light = a.x * p.x + a.y * p.y - light.normal * a.seen.height;
-    e.position = light.position + a.x * on_lamp.x + a.y * on_lamp.y;
+    const bool outside = light.ellipse && !is_in_ellipse(light, on_lamp);
+    const Vec3 to_light = light.axis_u * p.x + light.axis_v * p.y - light.normal * a.seen.height;
+    e.position = area_point(light, on_lamp);
     e.normal = light.normal;
     e.distance = length(to_light);
     e.direction = to_light / e.distance;
@@ -130,9 +138,8 @@ VLP_HD inline float area_pdf_next_event(const Light& light, Vec3 receiver, Vec3 
     const AreaAspect a = area_aspect(light, receiver);
     if (a.draw == AreaDraw::nothing) return 0;
     const Vec3 on_lamp = position - light.position;
-    const Vec2 p{dot(on_lamp, a.x) - a.foot.x, dot(on_lamp, a.y) - a.foot.y};
-    const bool clipped = p.x < -a.seen.height / light.spread || p.x > a.seen.height / light.spread ||
-                         p.y < -a.seen.height / light.spread || p.y > a.seen.height / light.spread;
+    const Vec2 p{dot(on_lamp, light.axis_u) - a.foot.x, dot(on_lamp, light.axis_v) - a.foot.y};
+    const bool clipped = std::fabs(p.x) > a.reach || std::fabs(p.y) > a.reach;
     return clipped && a.draw != AreaDraw::ellipse ? 0 : area_pdf(light, a, p);
 }
 
@@ -144,9 +151,9 @@ VLP_HD inline bool area_intersect(const Light& light, const Ray& ray, float& t) 
     t = dot(from_light, light.normal) / cosine;
     if (!(t > 0 && t < ray.t_max)) return false;
     const Vec3 p = from_light + t * ray.direction;
-    const float x = dot(p, light.axis_u) / length_squared(light.axis_u);
-    const float y = dot(p, light.axis_v) / length_squared(light.axis_v);
-    return light.ellipse ? x * x + y * y <= 1 : std::fabs(x) <= 1 && std::fabs(y) <= 1;
+    const Vec2 q{dot(p, light.axis_u), dot(p, light.axis_v)};
+    return light.ellipse ? is_in_ellipse(light, q)
+                         : std::fabs(q.x) <= light.half_size.x && std::fabs(q.y) <= light.half_size.y;
 }
 
 }  // namespace vlp

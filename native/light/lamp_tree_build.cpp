@@ -9,7 +9,9 @@ namespace {
 
 // As wide as rounding in the tests of ray and shape may ask for.
 Box box_of(const Light& light) {
-    const auto reach = [&](float u, float v) { return light.radius + std::fabs(u) + std::fabs(v); };
+    const auto reach = [&](float u, float v) {
+        return light.radius + std::fabs(u) * light.half_size.x + std::fabs(v) * light.half_size.y;
+    };
     const Vec3 half{reach(light.axis_u.x, light.axis_v.x), reach(light.axis_u.y, light.axis_v.y),
                     reach(light.axis_u.z, light.axis_v.z)};
     const float size =

@@ -78,9 +78,10 @@ std::optional<Light> make_area(const Affine& transform, Rgb power, float size_x,
     light.kind = LightKind::area;
     light.ellipse = ellipse;
     light.position = transform.column(3);
-    light.axis_u = u;
-    light.axis_v = upright;
-    light.normal = normalize(cross(x, upright / static_cast<float>(height)));
+    light.axis_u = x;
+    light.axis_v = upright / static_cast<float>(height);
+    light.half_size = {static_cast<float>(lu), static_cast<float>(height)};
+    light.normal = normalize(cross(light.axis_u, light.axis_v));
     if (dot(light.normal, transform.column(2)) > 0) light.normal = -light.normal;
     const double area = (ellipse ? k_pi_d : 4.0) * lu * height;
     light.area = static_cast<float>(area);

@@ -17,7 +17,8 @@ struct Light {
     Rgb radiance;                 // point and spot of radius 0: intensity (W/sr); sun of angle 0: irradiance (W/m²);
                                   // environment: mean over all directions
     Vec3 position;                // point, spot, area: centre; sphere: centre in world space; triangle: first vertex
-    Vec3 axis_u, axis_v;  // area: half sides, orthogonal; triangle: edges from the first vertex; spot: spot.h
+    Vec3 axis_u, axis_v;  // area: unit, along its sides; triangle: edges from the first vertex; spot: spot.h
+    Vec2 half_size;  // area: half its sides (m)
     Vec3 normal;  // area, spot, sun: the direction of shining; triangle: unit geometric normal
     float radius = 0;  // point, spot, sphere; sun: sine of half the disc's angle
     float area = 0;  // of the emitting shape, one side (m²)

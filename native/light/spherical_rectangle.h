@@ -17,26 +17,34 @@ VLP_HD inline float area(const SeenRectangle& r) { return (r.high.x - r.low.x) *
 // The excess over pi / 2 instead of the angle itself keeps digits when the rectangle is small.
 struct SphericalRectangle {
     float b0, b1;  // z of the unit normals of the planes through the edges y = low.y and y = high.y
+    float one_minus_b0_squared;
     float excess_23;  // of the two corners at low.x
     float solid_angle;
 };
 
 VLP_HD inline SphericalRectangle make_spherical(const SeenRectangle& r) {
-    const auto slope = [&](float x) { return x / std::sqrt(x * x + r.height * r.height); };
-    const float n0 = -slope(r.low.y), n1 = slope(r.high.x), n2 = slope(r.high.y), n3 = -slope(r.low.x);
-    const float excess_23 = arc_sine(n2 * n3) + arc_sine(n3 * n0);
-    return {n0, n2, excess_23, arc_sine(n0 * n1) + arc_sine(n1 * n2) + excess_23};
+    // Loops over the edges and corners, for the lanes of vectors.
+    const float edge[4] = {-r.low.y, r.high.x, r.high.y, -r.low.x};
+    float per_distance[4], z[4], excess[4];
+    for (int i = 0; i < 4; ++i) {
+        per_distance[i] = 1 / std::sqrt(square(edge[i]) + square(r.height));
+        z[i] = edge[i] * per_distance[i];
+    }
+    for (int i = 0; i < 4; ++i) excess[i] = arc_sine(z[i] * z[(i + 1) % 4]);
+    const float excess_23 = excess[2] + excess[3];
+    return {z[0], z[2], square(r.height * per_distance[0]), excess_23, excess[0] + excess[1] + excess_23};
 }
 
 // A point of the rectangle, in its plane.
 VLP_HD inline Vec2 sample(const SeenRectangle& r, const SphericalRectangle& s, Vec2 u) {
     // Below the angle au of the paper is pi + w.
     const float w = u.x * s.solid_angle - s.excess_23;
-    const float f = (std::cos(w) * s.b0 + s.b1) / std::sin(w);
-    const float h2 = square(r.height);
-    const float x_over_h = 1 / safe_sqrt(f * f - h2 / (square(r.low.y) + h2));
-    const float x = clamp(std::copysign(r.height * x_over_h, f), r.low.x, r.high.x);
-    const float d2 = x * x + h2;
+    const Vec2 half = cos_sin_half_turn(w * (0.5f * k_inv_pi));  // of w / 2
+    // The paper's f is a / b.
+    const float a = (1 - 2 * square(half.y)) * s.b0 + s.b1, b = 2 * half.x * half.y;
+    const float x_over_h = std::copysign(b, a * b) / safe_sqrt(square(a) - square(b) * s.one_minus_b0_squared);
+    const float x = clamp(r.height * x_over_h, r.low.x, r.high.x);
+    const float d2 = x * x + square(r.height);
     const float v0 = r.low.y / std::sqrt(d2 + square(r.low.y)), v1 = r.high.y / std::sqrt(d2 + square(r.high.y));
     const float v = lerp(v0, v1, u.y);
     const float y = v * std::sqrt(d2 / (1 - v * v));

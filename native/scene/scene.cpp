@@ -227,7 +227,9 @@ bool Scene::bound() {
     Vec3 high = no_surface ? -low : bvh_.high;
     for (const Light& lamp : std::span(lights_).first(info_.lamps)) {
         if (is_infinite(lamp)) continue;
-        const float reach = lamp.radius + length(lamp.axis_u) + length(lamp.axis_v);
+        const bool area = lamp.kind == LightKind::area;
+        const Vec2 half = area ? lamp.half_size : Vec2{length(lamp.axis_u), length(lamp.axis_v)};
+        const float reach = lamp.radius + half.x + half.y;
         low = min_of(low, lamp.position - Vec3{reach, reach, reach});
         high = max_of(high, lamp.position + Vec3{reach, reach, reach});
     }

@@ -31,8 +31,8 @@ struct PositionMap {
         }
         if (round()) return l.position + l.radius * DirectionMap{make_frame(direction), 2}.direction(p);
         if (l.kind == LightKind::triangle) return l.position + l.axis_u * (1 - r) + l.axis_v * (r * p.y);
-        if (l.kind == LightKind::area && l.ellipse) return l.position + l.axis_u * c + l.axis_v * d;
-        return l.position + l.axis_u * (2 * p.x - 1) + l.axis_v * (2 * p.y - 1);
+        if (l.kind == LightKind::area && l.ellipse) return area_point(l, {l.half_size.x * c, l.half_size.y * d});
+        return area_point(l, {l.half_size.x * (2 * p.x - 1), l.half_size.y * (2 * p.y - 1)});
     }
     Vec2 point(Vec3 position, Vec3 direction) const {
         const Light& l = s.light;
@@ -52,10 +52,12 @@ struct PositionMap {
             return DirectionMap{make_frame(direction), 2}.point(v / length(v));
         }
         if (is_delta(l)) return {0.5f, 0.5f};
-        const float uu = length_squared(l.axis_u), vv = length_squared(l.axis_v), uv = dot(l.axis_u, l.axis_v);
-        const float x = (dot(v, l.axis_u) * vv - dot(v, l.axis_v) * uv) / (uu * vv - uv * uv);
-        const float y = (dot(v, l.axis_v) * uu - dot(v, l.axis_u) * uv) / (uu * vv - uv * uv);
-        EXPECT_LT(length(v - l.axis_u * x - l.axis_v * y), 1e-5f);  // in its plane
+        const Vec2 size = l.kind == LightKind::area ? l.half_size : Vec2{1, 1};
+        const Vec3 a = l.axis_u * size.x, b = l.axis_v * size.y;
+        const float uu = length_squared(a), vv = length_squared(b), uv = dot(a, b);
+        const float x = (dot(v, a) * vv - dot(v, b) * uv) / (uu * vv - uv * uv);
+        const float y = (dot(v, b) * uu - dot(v, a) * uv) / (uu * vv - uv * uv);
+        EXPECT_LT(length(v - a * x - b * y), 1e-5f);  // in its plane
         if (l.kind == LightKind::triangle) return {square(1 - x), y / (1 - x)};
         return l.ellipse ? polar(x, y) : Vec2{0.5f * (x + 1), 0.5f * (y + 1)};
     }
