@@ -80,7 +80,7 @@ public:
         vertices_in_piece_ = std::vector<uint32_t>(piece_count(pass));
         stored_in_piece_ = std::vector<uint32_t>(piece_count(pass) + 1);
         tiles_ = tiles_in_morton_order(scene.window());
-        plan_ = SamplePlan(scene.window());
+        plan_ = SamplePlan(scene.window(), pass.adaptive);
         moments_ = std::vector<PixelMoments>(pass.adaptive ? scene.window().pixel_count() : 0);
     }
 
@@ -89,7 +89,7 @@ public:
         counters.work_done = 0;
         counters.work_total = pieces + static_cast<uint32_t>(tiles_.size());
         for_rows(film, [&](uint32_t begin, uint32_t end) { film.clear_splats(begin, end); });
-        if (pass_.adaptive && plan_.due()) plan_samples();
+        if (plan_.due()) plan_samples();
         const SampleRates rates = plan_.rates(iteration, plan_.levels().data(), moments_.data());
 
         LightVertexCache cache;

@@ -62,7 +62,7 @@ public:
 
     bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
         if (downloading_ > 0 && device_.is_over(downloaded_)) add_download(film);
-        if (pass_.adaptive && plan_.due()) plan_samples();
+        if (plan_.due()) plan_samples();
         const SampleRates rates = plan_.rates(iteration, levels_.data(), moments_.data());
         counters.work_done = 0;
         counters.work_total = pixels() + (pass_.traces_light() ? pass_.light_paths : 0);
@@ -188,7 +188,7 @@ private:
         resize(splats_, pass.splats ? pixels * 3 : 0, "splats");
         resize(point_splats_, pass.splats && pass.guides ? pixels * 3 : 0, "splats");
         resize(sums_here_, sums_.size(), "the film's sums on the host", true);
-        plan_ = SamplePlan(window);
+        plan_ = SamplePlan(window, pass.adaptive);
         const size_t planned = pass.adaptive ? pixels : 0;
         resize(moments_, planned, "the noise of pixels");
         resize(levels_, planned, "the samples of pixels");

@@ -62,9 +62,10 @@ std::vector<int8_t> levels_for(std::span<const float> deviation) {
 }
 
 SampleRates SamplePlan::rates(uint32_t iteration, const int8_t* levels, const PixelMoments* moments) {
+    if (!adaptive_) return {.index = iteration};
     if (iterations_ == 0) sequence_ = iteration;
-    if (levels_.empty()) return {.iteration = iteration};
-    return {iteration, sequence_, turn_, levels, moments};
+    if (levels_.empty()) return {.sequence = sequence_, .index = iterations_};
+    return {sequence_, iterations_, turn_, levels, moments};
 }
 
 uint64_t SamplePlan::finish_iteration() {
@@ -73,7 +74,7 @@ uint64_t SamplePlan::finish_iteration() {
                                              : turns_[turn_ % std::size(turns_)];
     ++turn_;
     ++iterations_;
-    due_ = iterations_ >= k_first_block && std::has_single_bit(iterations_);
+    due_ = adaptive_ && iterations_ >= k_first_block && std::has_single_bit(iterations_);
     return samples;
 }
 

@@ -20,28 +20,28 @@ inline constexpr int k_least_level = -3, k_most_level = 4;
 
 // Sums over the iterations that took samples in a pixel, of n samples with mean y: how noisy the eye walks are there.
 struct PixelMoments {
-    float count = 0;  // iterations
-    float samples = 0;  // sum of n
+    uint32_t count = 0;  // iterations
+    uint32_t samples = 0;  // sum of n
     float first = 0;  // sum of n y
     float second = 0;  // sum of n y^2
 
     VLP_HD void add(const PixelSample& mean, uint32_t n) {
         const float y = min_of((mean.rgba[0] + mean.rgba[1] + mean.rgba[2]) * (1.0f / 3.0f), 1e9f);
         const float weight = static_cast<float>(n);
-        count += 1, samples += weight, first += weight * y, second += weight * y * y;
+        count += 1, samples += n, first += weight * y, second += weight * y * y;
     }
     // The variance of one sample over (mean + 0.1)^2: errors count by what they are to the pixel, black ones aside.
     VLP_HD float relative_variance() const {
         if (count < 2) return 0;
-        const float mean = first / samples;
-        return max_of(second - first * mean, 0.0f) / ((count - 1) * square(mean + 0.1f));
+        const float mean = first / static_cast<float>(samples), others = static_cast<float>(count - 1);
+        return max_of(second - first * mean, 0.0f) / (others * square(mean + 0.1f));
     }
 };
 
-// An iteration's place in its block, and what is known of the pixels; no levels: one sample in each.
+// An iteration's place among those of its device, and what is known of the pixels; no levels: one sample in each.
 struct SampleRates {
-    uint32_t iteration = 0;
-    uint32_t sequence = 0;  // of random numbers: the device's first iteration
+    uint32_t sequence = 0;  // of random numbers
+    uint32_t index = 0;  // in it, of the one sample where there are no levels
     uint32_t turn = 0;  // iterations of the block before this one
     const int8_t* levels = nullptr;
     const PixelMoments* moments = nullptr;  // where there are levels
@@ -60,17 +60,19 @@ VLP_HD inline bool is_drawn(int level, uint32_t turn, uint32_t pixel) {
 }
 
 VLP_HD inline PixelTurn turn_of(const SampleRates& rates, uint32_t pixel) {
-    if (rates.levels == nullptr) return {1, 0, rates.iteration};
+    if (rates.levels == nullptr) return {1, rates.sequence, rates.index};
     const int level = rates.levels[pixel];
     if (level < 0 && !is_drawn(level, rates.turn, pixel)) return {0, 0, 0};
-    return {1u << max_of(level, 0), rates.sequence, static_cast<uint32_t>(rates.moments[pixel].samples)};
+    return {1u << max_of(level, 0), rates.sequence, rates.moments[pixel].samples};
 }
 
-// The blocks of a render on one device (host only). Blocks end after 8, 16, 32 ... iterations; the first has no levels.
+// The blocks of a render on one device (host only). Blocks end after 8, 16, 32 ... iterations; the first has no levels. Where
+// sampling is not adaptive it never ends, and iteration i takes number i of each pixel's sequence. Else a device takes all
+// numbers of a sequence of its own: devices that share the iterations would take some of one sequence twice.
 class SamplePlan {
 public:
     SamplePlan() = default;
-    explicit SamplePlan(Window window) : window_(window) {}
+    SamplePlan(Window window, bool adaptive) : window_(window), adaptive_(adaptive) {}
 
     // The place of the iteration that comes next. `levels` and `moments`: where it will find the plan's and the pixels'.
     SampleRates rates(uint32_t iteration, const int8_t* levels, const PixelMoments* moments);
@@ -86,6 +88,7 @@ private:
     void count_samples();
 
     Window window_;
+    bool adaptive_ = false;
     std::vector<int8_t> levels_;  // none before the first plan
     uint32_t iterations_ = 0, sequence_ = 0, turn_ = 0;
     bool due_ = false;

@@ -90,7 +90,7 @@ VLP_HD inline VlpConnection join_unshadowed(const SceneView& scene, const PassSe
 
 // Candidate `i` of the M of a connection that draws `u`: one of the V stored VLPs, from the i-th stratum of them.
 VLP_HD inline uint32_t candidate_index(const LightVertexCache& cache, uint32_t candidates, uint32_t i, uint32_t u) {
-    const uint64_t stratum = candidates > 1 ? ((static_cast<uint64_t>(i) << 32) + u) / candidates : u;
+    const uint64_t stratum = ((static_cast<uint64_t>(i) << 32) + u) / candidates;
     return static_cast<uint32_t>((stratum * cache.stored_count) >> 32);
 }
 

@@ -36,7 +36,7 @@ Devices make_devices(const std::string& device, const Scene& scene, PassSettings
 class Renderer {
 public:
     // `pass` as for_scene gives it. Iterations count from `first`, which decides their random numbers: ranges rendered apart
-    // add up to what one renderer makes of the whole. A helper takes none from `end` on.
+    // add up to what one renderer makes of the whole, unless sampling is adaptive. A helper takes none from `end` on.
     Renderer(std::shared_ptr<const Scene> scene, const PassSettings& pass, Window window, Devices devices,
              uint32_t first, uint32_t end);
 

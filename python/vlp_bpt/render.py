@@ -85,7 +85,8 @@ class Renderer:
 
     Raises SceneError or SettingsError for what cannot be rendered, DeviceError when the device fails or there is no
     library to denoise with. `first_iteration`
-    begins a later range of the same render: ranges rendered apart merge to the picture that one render makes.
+    begins a later range of the same render: ranges rendered apart merge to the picture that one render makes, unless
+    they are adaptive.
     `warnings` are about the scene, and about devices that are not what was asked for, also once one fails during a
     render, which then goes on without it. Calls may come from any thread; `iterate` and `read` wait for each other.
     """

@@ -76,9 +76,10 @@ def test_a_window_is_a_part_of_the_whole() -> None:
 
 def test_ranges_add_up_to_the_whole() -> None:
     scene = load("indirect_room")
-    whole = renderer(scene, iterations=6)
-    first = renderer(scene, iterations=2)
-    rest = Renderer(scene, RenderSettings(samples=4, device=DEVICE, filter="BOX"), first_iteration=2)  # type: ignore[arg-type]
+    whole = renderer(scene, iterations=6, adaptive=False)
+    first = renderer(scene, iterations=2, adaptive=False)
+    options = RenderSettings(samples=4, device=DEVICE, filter="BOX", adaptive=False)  # type: ignore[arg-type]
+    rest = Renderer(scene, options, first_iteration=2)
     rest.iterate(4)
     first.add_film_state(rest.film_state(), 4)
     np.testing.assert_array_equal(first.film_state(), whole.film_state())
@@ -89,7 +90,7 @@ def test_both_devices_together_make_the_same_iterations() -> None:
     if DEVICE == "CPU":
         pytest.skip("needs a GPU")
     scene = load("cornell_box")
-    both, alone = (renderer(scene, device, 64) for device in ("HYBRID", DEVICE))
+    both, alone = (renderer(scene, device, 64, adaptive=False) for device in ("HYBRID", DEVICE))
     assert both.metadata()["ranges"] == [[0, 64]]
     np.testing.assert_allclose(both.read()[..., :3].mean(), alone.read()[..., :3].mean(), rtol=1e-3)
 

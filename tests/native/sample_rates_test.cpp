@@ -79,12 +79,12 @@ struct Simulation {
     static constexpr uint32_t k_side = 16, k_pixels = k_side * k_side;
     using Draw = std::function<float(uint32_t pixel, uint32_t index)>;
 
-    SamplePlan plan{{0, 0, k_side, k_side}};
+    SamplePlan plan{{0, 0, k_side, k_side}, true};
     std::vector<PixelMoments> moments = std::vector<PixelMoments>(k_pixels);
     std::vector<PixelSample> frame = std::vector<PixelSample>(k_pixels);
     std::vector<double> sums = std::vector<double>(k_pixels);
     std::vector<uint32_t> samples = std::vector<uint32_t>(k_pixels);
-    uint32_t iterations = 0;
+    uint32_t iterations = 0, first_iteration = 0;
 
     void iterate(const Draw& draw) {
         if (plan.due()) {
@@ -92,13 +92,13 @@ struct Simulation {
             for (uint32_t i = 0; i < k_pixels; ++i) variance[i] = moments[i].relative_variance();
             plan.plan(variance);
         }
-        const SampleRates rates = plan.rates(iterations, plan.levels().data(), moments.data());
+        const SampleRates rates = plan.rates(first_iteration + 2 * iterations, plan.levels().data(), moments.data());
         uint64_t taken = 0;
         for (uint32_t i = 0; i < k_pixels; ++i) {
             const PixelTurn turn = turn_of(rates, i);
             if (turn.samples > 0) {
                 EXPECT_EQ(turn.first_index, samples[i]) << "no number is used twice, and none is left out";
-                EXPECT_EQ(turn.sequence, 0u);
+                EXPECT_EQ(turn.sequence, first_iteration);
                 float sum = 0;
                 for (uint32_t k = 0; k < turn.samples; ++k) sum += draw(i, turn.first_index + k);
                 frame[i].rgba[0] = frame[i].rgba[1] = frame[i].rgba[2] = sum / static_cast<float>(turn.samples);
@@ -132,6 +132,29 @@ TEST(SamplePlan, SamplesGoWhereTheNoiseIs) {
     const auto all = std::accumulate(film.samples.begin(), film.samples.end(), 0u);
     EXPECT_GT(all, 0.75 * 256 * Simulation::k_pixels);
     EXPECT_LT(all, 1.1 * 256 * Simulation::k_pixels);  // a block's first turn takes some more
+}
+
+// Iterations that are dealt out: each of two devices has every other one.
+TEST(SamplePlan, DevicesHaveSequencesOfTheirOwn) {
+    std::mt19937 random(5);
+    std::exponential_distribution<float> noise(1);
+    Simulation devices[2];
+    devices[1].first_iteration = 1;
+    for (int i = 0; i < 40; ++i) {
+        for (Simulation& device : devices) device.iterate([&](uint32_t, uint32_t) { return noise(random); });
+    }
+}
+
+TEST(SamplePlan, WithoutAdaptingIterationsAreNumbers) {
+    SamplePlan plan({0, 0, 4, 2}, false);
+    for (uint32_t i = 7; i < 40; i += 3) {
+        const PixelTurn turn = turn_of(plan.rates(i, nullptr, nullptr), 5);
+        EXPECT_EQ(turn.samples, 1u);
+        EXPECT_EQ(turn.sequence, 0u);
+        EXPECT_EQ(turn.first_index, i);
+        EXPECT_EQ(plan.finish_iteration(), 8u);
+        EXPECT_FALSE(plan.due());
+    }
 }
 
 TEST(SamplePlan, TheMeanIsRightAtAnyTime) {

@@ -326,15 +326,16 @@ def test_the_window_is_a_part_of_the_whole_picture() -> None:
 
 
 def test_ranges_add_up_bit_for_bit_in_any_order() -> None:
-    whole = make(12).render().pixels
+    whole = make(12, adaptive=False).render().pixels
     parts = [
-        (make(samples, first=first, threads=threads)) for first, samples, threads in ((7, 5, 1), (0, 3, 2), (3, 4, 0))
+        make(samples, first=first, threads=threads, adaptive=False)
+        for first, samples, threads in ((7, 5, 1), (0, 3, 2), (3, 4, 0))
     ]
     for part in parts:
         part.render()
     states = [(part.film_state(), part.iterations) for part in parts]
     for order in ((0, 1, 2), (2, 0, 1)):
-        merged = make(1)
+        merged = make(1, adaptive=False)
         for i in order:
             merged.add_film_state(*states[i])
         assert merged.iterations == 12

@@ -90,6 +90,15 @@ class Watch:
 
         setattr(owner, name, begun)
 
+    def end_with(self, owner: Any, name: str) -> None:
+        """It ends when `owner.name` is called, which is cancelled."""
+
+        def ended(*_: Any, **__: Any) -> Any:
+            self.end()
+            raise vlp_bpt.Cancelled("has started")
+
+        setattr(owner, name, ended)
+
     def result(self, engine: str, threads: int) -> Start:
         if self._began is None or self._ended is None:
             raise Error(f"{engine}: came to no iteration")
@@ -105,18 +114,12 @@ def _start_ours(path: Path, threads: int, size: int) -> Start:
     _warm_up(bpy, "VLP_BPT")
     _blender._open(path, None, {"samples": 1, "threads": threads, "noise_threshold": 0.0})
     watch = Watch()
-
-    class Watched(render.Renderer):
-        def render(self, *_: Any) -> Any:
-            watch.end()
-            raise vlp_bpt.Cancelled("has started")
-
     watch.begin_with(final, "render")
     watch.time(scenes, "export_scene", "reading the scene")
     watch.time(vlp_bpt.Scene, "validate", "checks")
     watch.time(render, "upload", "upload")
     watch.time(render, "_built_scene", "tree")
-    vlp_bpt.Renderer = Watched  # type: ignore[misc]
+    watch.end_with(vlp_bpt.Renderer, "render")
     _render(bpy, size)
     watch.parts["tree"] = watch.parts.get("tree", 0.0) - watch.parts.get("upload", 0.0)
     return watch.result(OURS, threads)
