@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "integrator/light_tracing.h"
 #include "integrator/path_tracing.h"
+#include "integrator/vlp_groups.h"
 #include "scene/scene.h"
 
 namespace vlp {
@@ -49,6 +50,11 @@ uint32_t piece_count(const PassSettings& pass) {
     return pass.traces_light() ? (pass.light_paths + k_paths_per_piece - 1) / k_paths_per_piece : 0;
 }
 
+// The size of the table of groups, with V at its end.
+size_t groups_table(const PassSettings& pass) {
+    return pass.kappa > 0 ? size_t{k_vlp_groups} * piece_count(pass) + 1 : 0;
+}
+
 // Tiles along a Z-order curve: neighbours in time are neighbours in the picture.
 std::vector<Tile> tiles_in_morton_order(Window window) {
     const uint32_t nx = tiles_along(window.width), ny = tiles_along(window.height);
@@ -78,7 +84,7 @@ public:
             stored_ = std::vector<uint32_t>(capacity);
         }
         vertices_in_piece_ = std::vector<uint32_t>(piece_count(pass));
-        stored_in_piece_ = std::vector<uint32_t>(piece_count(pass) + 1);
+        groups_ = std::vector<uint32_t>(groups_table(pass));
         tiles_ = tiles_in_morton_order(scene.window());
         plan_ = SamplePlan(scene.window(), pass.adaptive);
         moments_ = std::vector<PixelMoments>(pass.adaptive ? scene.window().pixel_count() : 0);
@@ -119,8 +125,8 @@ public:
         MemoryUse& cpu = memory["CPU"];
         cpu.light_vertices += stored_.capacity() * (sizeof(LightVertex) + sizeof(uint32_t));
         cpu.film += moments_.size() * (sizeof(PixelMoments) + sizeof(int8_t));
-        cpu.work += (vertices_in_piece_.capacity() + stored_in_piece_.capacity()) * sizeof(uint32_t) +
-                    tiles_.capacity() * sizeof(Tile);
+        cpu.work +=
+            (vertices_in_piece_.capacity() + groups_.capacity()) * sizeof(uint32_t) + tiles_.capacity() * sizeof(Tile);
     }
 
 private:
@@ -141,32 +147,31 @@ private:
             if (stop) return;
             LightVertex path_alone[k_max_walk];
             SplatSink<AtomicAdd> sink{pass_, film.window(), film.splats().data(), film.point_splats().data(), {}};
-            uint32_t vertices = 0, stored = 0;
+            uint32_t vertices = 0;
             const uint32_t end = std::min((piece + 1) * k_paths_per_piece, pass_.light_paths);
             for (uint32_t path = piece * k_paths_per_piece; path < end; ++path) {
                 LightVertex* slots = slots_ ? slots_.get() + first_slot(piece) + vertices : path_alone;
-                const auto counts = trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots, sink);
-                vertices += counts.vertices, stored += counts.connectible;
+                vertices += trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots, sink).vertices;
             }
             vertices_in_piece_[piece] = vertices;
-            stored_in_piece_[piece] = stored;
             count_dropped(sink.dropped);
             counters.work_done.fetch_add(1, std::memory_order_relaxed);
         });
     }
 
-    // Lists the slots that can be connected, in their order.
+    // Lists the slots that can be connected, by their groups.
     LightVertexCache list_stored() {
-        stored_in_piece_.back() = 0;
-        std::exclusive_scan(stored_in_piece_.begin(), stored_in_piece_.end(), stored_in_piece_.begin(), 0u);
-        pool_.run(static_cast<uint32_t>(vertices_in_piece_.size()), [&](uint32_t piece) {
-            const uint32_t end = first_slot(piece) + vertices_in_piece_[piece];
-            uint32_t next = stored_in_piece_[piece];
-            for (uint32_t slot = first_slot(piece); slot < end; ++slot) {
-                if (slots_[slot].connectible()) stored_[next++] = slot;
-            }
+        const auto pieces = static_cast<uint32_t>(vertices_in_piece_.size());
+        const auto end_of = [&](uint32_t piece) { return first_slot(piece) + vertices_in_piece_[piece]; };
+        std::fill(groups_.begin(), groups_.end(), 0u);
+        pool_.run(pieces, [&](uint32_t i) {
+            count_groups(pass_.vlp_grid, slots_.get(), first_slot(i), end_of(i), &groups_[i], pieces);
         });
-        return {slots_.get(), stored_.data(), stored_in_piece_.back()};
+        std::exclusive_scan(groups_.begin(), groups_.end(), groups_.begin(), 0u);
+        pool_.run(pieces, [&](uint32_t i) {
+            list_groups(pass_.vlp_grid, slots_.get(), first_slot(i), end_of(i), &groups_[i], pieces, stored_.data());
+        });
+        return {slots_.get(), stored_.data(), groups_.back()};
     }
 
     void run_tile(const SampleRates& rates, Film& film, const LightVertexCache& cache, Tile tile) {
@@ -215,7 +220,7 @@ private:
     LightVertexBuffer slots_;
     std::vector<uint32_t> stored_;
     std::vector<uint32_t> vertices_in_piece_;
-    std::vector<uint32_t> stored_in_piece_;  // first stored VLP of each piece, V last
+    std::vector<uint32_t> groups_;  // the table of vlp_groups.h, a column for each piece; V last
     std::vector<Tile> tiles_;
     SamplePlan plan_;
     std::vector<PixelMoments> moments_;  // of the film's pixels, where sampling is adaptive
@@ -231,7 +236,7 @@ void add_cpu_memory(MemoryByDevice& memory, Window window, const PassSettings& p
     MemoryUse& cpu = memory["CPU"];
     cpu.film += sample_plan_bytes(window, pass);
     if (pass.kappa > 0) cpu.light_vertices += light_vertex_capacity(pass) * (sizeof(LightVertex) + sizeof(uint32_t));
-    cpu.work += (2 * size_t{piece_count(pass)} + 1) * sizeof(uint32_t) +
+    cpu.work += (piece_count(pass) + groups_table(pass)) * sizeof(uint32_t) +
                 size_t{tiles_along(window.width)} * tiles_along(window.height) * sizeof(Tile);
 }
 

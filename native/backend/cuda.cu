@@ -101,9 +101,9 @@ public:
     }
     void scan(uint32_t* counts, uint32_t n, void* scratch, size_t scratch_bytes) {
         size_t needed = 0;
-        cub::DeviceScan::InclusiveSum(nullptr, needed, counts, counts, static_cast<int>(n), passes_);
+        cub::DeviceScan::ExclusiveSum(nullptr, needed, counts, counts, static_cast<int>(n), passes_);
         if (needed > scratch_bytes) throw std::runtime_error("device CUDA: a scan needs more memory than foreseen");
-        check_cuda(cub::DeviceScan::InclusiveSum(scratch, scratch_bytes, counts, counts, static_cast<int>(n), passes_),
+        check_cuda(cub::DeviceScan::ExclusiveSum(scratch, scratch_bytes, counts, counts, static_cast<int>(n), passes_),
                    "counting virtual light points");
     }
 

@@ -18,7 +18,7 @@ namespace vlp {
 //   upload(to, from, bytes)                      done when it returns
 //   clear(to, bytes)                             queued in Queue::passes, as are the next two
 //   launch(begin, end, body)                     body(i) for every i of [begin, end)
-//   scan(counts, n, scratch, scratch_bytes)      inclusive sums in place
+//   scan(counts, n, scratch, scratch_bytes)      exclusive sums in place
 //   download(queue, to, from, bytes)            queued; `to` is memory on the host from `allocate`
 //   Event, record(event, queue)                 an event is over when what was queued before is done; at first it is
 //   queue_wait(queue, event)                    what is queued next waits for it
@@ -119,7 +119,7 @@ public:
         gpu.film += frame_.bytes() + guides_.bytes() + splats_.bytes() + point_splats_.bytes() + sums_.bytes() +
                     moments_.bytes() + levels_.bytes() + variance_.bytes();
         gpu.light_vertices += slots_.bytes() + stored_.bytes();
-        gpu.work += counts_.bytes() + end_of_path_.bytes() + vertices_in_path_.bytes() + scratch_.bytes();
+        gpu.work += counts_.bytes() + groups_.bytes() + vertices_in_path_.bytes() + scratch_.bytes();
         gpu.stacks = device_.stack_bytes();
         memory["CPU"].film += sums_here_.bytes() + variance_here_.bytes() + levels_.bytes();
         memory["CPU"].work += counts_here_.bytes();
@@ -215,9 +215,9 @@ private:
                 resize(slots_, traced ? light_vertex_capacity(pass_) : 0, "light vertices");
                 resize(stored_, slots_.size(), "the list of virtual light points");
                 const uint32_t paths = traced ? pass_.light_paths : 0;
-                resize(end_of_path_, paths, "counts of virtual light points");
                 resize(vertices_in_path_, paths, "counts of light vertices");
-                resize(scratch_, traced ? scan_bytes(paths) : 0, "a scan");
+                resize(groups_, traced ? ListingRuns(paths).table() : 0, "counts of virtual light points");
+                resize(scratch_, scan_bytes(groups_.size()), "a scan");
                 start_passes();
                 return;
             } catch (const OutOfDeviceMemory&) {
@@ -251,23 +251,26 @@ private:
             device_.clear(splats_.data(), splats_.bytes());
             device_.clear(point_splats_.data(), point_splats_.bytes());
         }
-        const LightPass light{scene_,
-                              pass_,
-                              iteration,
-                              window_,
-                              slots_.data(),
-                              end_of_path_.data(),
-                              vertices_in_path_.data(),
-                              splats_.data(),
-                              point_splats_.data(),
+        const LightPass light{scene_,         pass_,
+                              iteration,      window_,
+                              slots_.data(),  vertices_in_path_.data(),
+                              splats_.data(), point_splats_.data(),
                               counts_.data()};
         if (!launch_in_batches(pass_.light_paths, light, stop)) return false;
         if (!(pass_.kappa > 0)) return true;
-        device_.scan(end_of_path_.data(), pass_.light_paths, scratch_.data(), scratch_.bytes());
-        device_.launch(0, pass_.light_paths,
-                       ListStored{pass_, slots_.data(), end_of_path_.data(), vertices_in_path_.data(), stored_.data(),
-                                  counts_.data()});
+        list_stored();
         return true;
+    }
+
+    // Lists the light vertices that can be connected, by their groups.
+    void list_stored() {
+        const ListingRuns runs(pass_.light_paths);
+        const CountStored count{runs,          pass_.light_paths,        pass_.light_path_length, pass_.vlp_grid,
+                                slots_.data(), vertices_in_path_.data(), groups_.data()};
+        device_.clear(groups_.data(), groups_.bytes());
+        device_.launch(0, runs.count, count);
+        device_.scan(groups_.data(), static_cast<uint32_t>(groups_.size()), scratch_.data(), scratch_.bytes());
+        device_.launch(0, runs.count, ListStored{count, stored_.data(), counts_.data()});
     }
 
     // Queues body(i) for i below `count`, two batches ahead of the device at most. Whether `stop` let it.
@@ -291,7 +294,7 @@ private:
     Window window_;
     ByPart<Part> parts_;
     Buffer<LightVertex> slots_;
-    Buffer<uint32_t> stored_, end_of_path_;
+    Buffer<uint32_t> stored_, groups_;
     Buffer<uint8_t> vertices_in_path_;
     Buffer<std::byte> scratch_;
     Buffer<PixelSample> frame_;

@@ -5,6 +5,7 @@
 #include "core/atomic_add.h"
 #include "film/film.h"
 #include "integrator/light_tracing.h"
+#include "integrator/vlp_groups.h"
 
 namespace vlp {
 
@@ -21,7 +22,6 @@ struct LightPass {
     uint32_t iteration;
     Window window;
     LightVertex* slots;
-    uint32_t* stored_in_path;
     uint8_t* vertices_in_path;
     ExactSum *splats, *point_splats;
     PassCounts* counts;
@@ -31,29 +31,60 @@ struct LightPass {
         SplatSink<AtomicAdd> sink{pass, window, splats, point_splats, {}};
         const LightPathCounts found = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
         vertices_in_path[path] = static_cast<uint8_t>(found.vertices);
-        stored_in_path[path] = found.connectible;
         if (sink.dropped > 0) AtomicAdd{}(counts->dropped, sink.dropped);
     }
 };
 static_assert(k_max_walk <= UINT8_MAX);
 
-// Lists the slots of a light path that can be connected, behind those of the paths before it: `end_of_path` is the inclusive
-// scan of stored_in_path. The last path tells V.
-struct ListStored {
-    PassSettings pass;
+// Light paths that are listed by one thread, and how many threads that makes.
+struct ListingRuns {
+    static constexpr uint32_t k_most = 4096, k_least_paths = 32;
+    uint32_t paths = 0, count = 0;
+
+    ListingRuns() = default;
+    explicit ListingRuns(uint32_t light_paths)
+        : paths(max_of(k_least_paths, (light_paths + k_most - 1) / k_most)), count((light_paths + paths - 1) / paths) {}
+    // The size of the table of vlp_groups.h, with V at its end.
+    size_t table() const { return size_t{k_vlp_groups} * count + 1; }
+};
+
+// Counts the groups of the VLPs of run `run`, a column of `groups`.
+struct CountStored {
+    ListingRuns runs;
+    uint32_t light_paths, light_path_length;
+    VlpGrid grid;
     const LightVertex* slots;
-    const uint32_t* end_of_path;
     const uint8_t* vertices_in_path;
+    uint32_t* groups;
+
+    // visit(begin, end) for the slots of each of its paths.
+    template <typename Visit>
+    VLP_HD void for_paths(uint32_t run, const Visit& visit) const {
+        const uint32_t end = min_of((run + 1) * runs.paths, light_paths);
+        for (uint32_t path = run * runs.paths; path < end; ++path) {
+            const uint32_t first = path * light_path_length;
+            visit(first, first + vertices_in_path[path]);
+        }
+    }
+    VLP_HD void operator()(uint32_t run) const {
+        for_paths(run, [&](uint32_t begin, uint32_t end) {
+            count_groups(grid, slots, begin, end, groups + run, runs.count);
+        });
+    }
+};
+
+// Lists them, once `groups` has been summed. One run tells V.
+struct ListStored {
+    CountStored counted;
     uint32_t* stored;
     PassCounts* counts;
 
-    VLP_HD void operator()(uint32_t path) const {
-        uint32_t next = path == 0 ? 0 : end_of_path[path - 1];
-        const uint32_t first = path * pass.light_path_length;
-        for (uint32_t slot = first; slot < first + vertices_in_path[path]; ++slot) {
-            if (slots[slot].connectible()) stored[next++] = slot;
-        }
-        if (path + 1 == pass.light_paths) counts->stored_vlps = end_of_path[path];
+    VLP_HD void operator()(uint32_t run) const {
+        const CountStored& of = counted;
+        of.for_paths(run, [&](uint32_t begin, uint32_t end) {
+            list_groups(of.grid, of.slots, begin, end, of.groups + run, of.runs.count, stored);
+        });
+        if (run == 0) counts->stored_vlps = of.groups[size_t{k_vlp_groups} * of.runs.count];
     }
 };
 

@@ -29,7 +29,8 @@ void add_gpu_memory(MemoryByDevice& memory, const Scene& scene, const PassSettin
     gpu.work += sizeof(PassCounts);
     if (pass.traces_light()) {
         gpu.light_vertices += light_vertex_capacity(pass) * (sizeof(LightVertex) + sizeof(uint32_t));
-        gpu.work += pass.light_paths * (sizeof(uint32_t) + sizeof(uint8_t)) + scan_bytes(pass.light_paths);
+        const size_t groups = ListingRuns(pass.light_paths).table();
+        gpu.work += pass.light_paths * sizeof(uint8_t) + groups * sizeof(uint32_t) + scan_bytes(groups);
     }
     // The sums come to the host through memory that stays in its place.
     memory["CPU"].film += scene.window().pixel_count() * film_channels(pass) * sizeof(ExactSum);

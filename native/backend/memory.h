@@ -57,6 +57,6 @@ inline constexpr size_t k_device_alignment = 64;
 
 // What a scan over so many counts may take, which depends on the GPU: far more than the states of its blocks, each of which
 // has hundreds of counts.
-inline size_t scan_bytes(uint32_t counts) { return 16384 + size_t{counts} / 8; }
+inline size_t scan_bytes(size_t counts) { return counts > 0 ? 16384 + counts / 8 : 0; }
 
 }  // namespace vlp

@@ -14,6 +14,11 @@ enum class Weighting : uint8_t { uniform, balance, power };
 // Longest walk of either side, in surface hits.
 inline constexpr uint32_t k_max_walk = 64;
 
+// Cells that virtual light points lie in, see vlp_groups.h. The default has one.
+struct VlpGrid {
+    Vec3 low{}, cells_per_metre{};
+};
+
 struct PassSettings {
     uint32_t light_path_length = 1;  // L: most surface hits of a light path, at most k_max_walk
     uint32_t eye_path_length = 5;    // K: most surface hits of an eye path, at most k_max_walk
@@ -32,6 +37,7 @@ struct PassSettings {
     bool adaptive = false;           // samples go where there is noise, see film/sample_rates.h
     uint32_t seed = 0;
     float kappa = 0;  // C M N / V, V being what a pilot pass of the scene stored: how often a VLP is drawn
+    VlpGrid vlp_grid;  // where those of the pilot lay
     Filter filter = Filter::blackman_harris;
     float filter_width = 1.5f;  // full width (pixels)
 
@@ -48,8 +54,8 @@ VLP_HD inline Rgb clamped(const PassSettings& pass, uint32_t n, Rgb light) {
     return most > 0 && size > most ? light * (most / size) : light;
 }
 
-// The virtual light points of one iteration. Path p keeps its hits y1 ... yL in slots [p L, p L + L); `stored` lists the
-// slots that can be connected, in that order.
+// The virtual light points of one iteration. A path's hits follow one another in the slots; `stored` lists the slots that
+// can be connected, in the order of vlp_groups.h.
 struct LightVertexCache {
     LightVertex* slots = nullptr;
     const uint32_t* stored = nullptr;

@@ -8,7 +8,8 @@
 namespace vlp {
 
 // Roulette spares eye walks that still carry this share of what they began with: a walk that goes on has a light sample
-// and a connection at each vertex, worth more than what ending it early saves.
+// and a connection at each vertex, worth more than what ending it early saves. Nor does it end them at mirrors and glass,
+// where they have brought nothing yet: the light that is seen in them comes seldom, and would weigh more.
 inline constexpr float k_spared_throughput = 2.0f / 3.0f;
 
 // The random numbers of a pixel's path: the number of a sequence, and which of it.
@@ -107,7 +108,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
         const BsdfSample next = sample(bsdf, eye.w_eye, Walk::eye, u_lobe, u_direction);
         if (!next.valid()) break;
         eye.throughput *= next.weight;
-        if (pass.roulette) {
+        if (pass.roulette && !next.specular) {
             const float survive = min_of(1.0f, max_component(eye.throughput) / k_spared_throughput);
             sampler.dimension = first_draw + next_ray_draws + 2;
             if (survive < 1 && sampler.next() >= survive) break;

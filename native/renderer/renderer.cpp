@@ -2,6 +2,8 @@
 #include "renderer/renderer.h"
 
 #include <algorithm>
+#include <cmath>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -10,15 +12,30 @@
 
 namespace vlp {
 
-float pilot_vlps_per_path(const SceneView& scene, const PassSettings& pass) {
+Pilot trace_pilot(const SceneView& scene, const PassSettings& pass) {
     constexpr uint32_t k_pilot_paths = 4096;
     std::vector<LightVertex> slots(pass.light_path_length);
-    uint32_t stored = 0;
+    double stored = 0, sum[3]{}, squares[3]{};
     for (uint32_t path = 0; path < k_pilot_paths; ++path) {
         NoSplats none;
-        stored += trace_light_path(scene, pass, k_pilot_stream, 0, path, slots.data(), none).connectible;
+        const uint32_t vertices = trace_light_path(scene, pass, k_pilot_stream, 0, path, slots.data(), none).vertices;
+        for (const LightVertex& vlp : std::span(slots).first(vertices)) {
+            if (!vlp.connectible()) continue;
+            ++stored;
+            for (int axis = 0; axis < 3; ++axis) {
+                const double x = (&vlp.position.x)[axis];
+                sum[axis] += x, squares[axis] += x * x;
+            }
+        }
     }
-    return static_cast<float>(stored) / static_cast<float>(k_pilot_paths);
+    Pilot pilot{static_cast<float>(stored / k_pilot_paths), {}};
+    for (int axis = 0; axis < 3 && stored > 0; ++axis) {
+        const double mean = sum[axis] / stored;
+        const double half = std::sqrt(3 * std::max(squares[axis] / stored - mean * mean, 0.0));
+        (&pilot.grid.low.x)[axis] = static_cast<float>(mean - half);
+        (&pilot.grid.cells_per_metre.x)[axis] = half > 0 ? static_cast<float>(2 / half) : 0.0f;
+    }
+    return pilot;
 }
 
 PassSettings for_scene(const SceneView& scene, PassSettings pass) {
@@ -26,9 +43,10 @@ PassSettings for_scene(const SceneView& scene, PassSettings pass) {
     pass.splats &= light_walks;
     pass.kappa = 0;
     if (pass.vlp_connections > 0 && light_walks) {
-        const float vlps_per_path = pilot_vlps_per_path(scene, pass);
-        if (vlps_per_path > 0)
-            pass.kappa = static_cast<float>(pass.vlp_connections * pass.vlp_candidates) / vlps_per_path;
+        const Pilot pilot = trace_pilot(scene, pass);
+        if (pilot.vlps_per_path > 0)
+            pass.kappa = static_cast<float>(pass.vlp_connections * pass.vlp_candidates) / pilot.vlps_per_path;
+        pass.vlp_grid = pilot.grid;
     }
     return pass;
 }

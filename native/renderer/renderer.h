@@ -101,10 +101,16 @@ private:
     std::chrono::steady_clock::time_point deadline_ = std::chrono::steady_clock::time_point::max();
 };
 
-// The settings with what the scene makes of them: kappa, from a pilot light pass, and splats only where there are light paths.
+// The settings with what the scene makes of them: kappa and the VLPs' grid, from a pilot light pass, and splats only where
+// there are light paths.
 PassSettings for_scene(const SceneView& scene, PassSettings pass);
 
-// How many VLPs a light path stores on average, by paths of a stream of their own: the same on every machine.
-float pilot_vlps_per_path(const SceneView& scene, const PassSettings& pass);
+// What light paths of a stream of their own find: the same on every machine.
+struct Pilot {
+    float vlps_per_path = 0;
+    VlpGrid
+        grid;  // four cells along each axis over sqrt(3) standard deviations around the mean: all, were they spread evenly
+};
+Pilot trace_pilot(const SceneView& scene, const PassSettings& pass);
 
 }  // namespace vlp

@@ -1,10 +1,13 @@
 // What each strategy finds, image by image.
 #include "renderer/strategies.h"
 
+#include <numeric>
 #include <stdexcept>
 
+#include "backend/memory.h"
 #include "integrator/light_tracing.h"
 #include "integrator/path_tracing.h"
+#include "integrator/vlp_groups.h"
 #include "renderer/renderer.h"
 #include "scene/scene.h"
 
@@ -36,22 +39,23 @@ struct StrategyRenderer::LightSink {
 
 StrategyRenderer::StrategyRenderer(std::shared_ptr<const Scene> scene, const PassSettings& pass, unsigned threads)
     : scene_(std::move(scene)), pass_(for_scene(scene_->view(), pass)), window_(scene_->window()), pool_(threads) {
-    if (pass_.traces_light()) slots_.resize(static_cast<size_t>(pass_.light_paths) * pass_.light_path_length);
+    if (pass_.traces_light()) slots_.resize(light_vertex_capacity(pass_));
+    stored_.resize(slots_.size());
     sums_.resize(image(most_light_vertices() + 1, 0, false));
 }
 
 void StrategyRenderer::iterate(uint32_t iteration) {
     const SceneView& scene = scene_->view();
-    stored_.clear();
     LightSink splats{*this};
     uint32_t end = 0;
     for (uint32_t path = 0; path < pass_.light_paths && pass_.traces_light(); ++path) {
         end += trace_light_path(scene, pass_, k_light_stream, iteration, path, &slots_[end], splats).vertices;
     }
-    for (uint32_t slot = 0; slot < end; ++slot) {
-        if (slots_[slot].connectible()) stored_.push_back(slot);
-    }
-    const LightVertexCache cache{slots_.data(), stored_.data(), static_cast<uint32_t>(stored_.size())};
+    std::vector<uint32_t> groups(k_vlp_groups + 1);
+    count_groups(pass_.vlp_grid, slots_.data(), 0, end, groups.data(), 1);
+    std::exclusive_scan(groups.begin(), groups.end(), groups.begin(), 0u);
+    list_groups(pass_.vlp_grid, slots_.data(), 0, end, groups.data(), 1, stored_.data());
+    const LightVertexCache cache{slots_.data(), stored_.data(), groups.back()};
     pool_.run(window_.height, [&](uint32_t y) {
         for (uint32_t x = 0; x < window_.width; ++x) {
             EyeSink found{*this, static_cast<size_t>(y) * window_.width + x};

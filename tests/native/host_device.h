@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 #include <vector>
 
@@ -69,9 +70,7 @@ public:
         });
     }
     void scan(uint32_t* counts, uint32_t n, void*, size_t) {
-        put(Queue::passes, [=] {
-            for (uint32_t i = 1; i < n; ++i) counts[i] += counts[i - 1];
-        });
+        put(Queue::passes, [=] { std::exclusive_scan(counts, counts + n, counts, 0u); });
     }
     void download(Queue queue, void* to, const void* from, size_t bytes) {
         const bool fails =

@@ -54,7 +54,8 @@ struct TracedLight {
 };
 
 inline PassSettings with_kappa(const SceneView& scene, PassSettings pass) {
-    const float per_path = pass.light_path_length > 0 && pass.light_paths > 0 ? pilot_vlps_per_path(scene, pass) : 0.0f;
+    const float per_path =
+        pass.light_path_length > 0 && pass.light_paths > 0 ? trace_pilot(scene, pass).vlps_per_path : 0.0f;
     pass.kappa = per_path > 0 ? static_cast<float>(pass.vlp_connections) / per_path : 0.0f;
     return pass;
 }
