@@ -151,7 +151,7 @@ private:
             const uint32_t end = std::min((piece + 1) * k_paths_per_piece, pass_.light_paths);
             for (uint32_t path = piece * k_paths_per_piece; path < end; ++path) {
                 LightVertex* slots = slots_ ? slots_.get() + first_slot(piece) + vertices : path_alone;
-                vertices += trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots, sink).vertices;
+                vertices += trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots, sink);
             }
             vertices_in_piece_[piece] = vertices;
             count_dropped(sink.dropped);

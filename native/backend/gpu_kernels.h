@@ -29,8 +29,8 @@ struct LightPass {
     VLP_HD void operator()(uint32_t path) const {
         LightVertex* own = slots + static_cast<size_t>(path) * pass.light_path_length;
         SplatSink<AtomicAdd> sink{pass, window, splats, point_splats, {}};
-        const LightPathCounts found = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
-        vertices_in_path[path] = static_cast<uint8_t>(found.vertices);
+        const uint32_t vertices = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
+        vertices_in_path[path] = static_cast<uint8_t>(vertices);
         if (sink.dropped > 0) AtomicAdd{}(counts->dropped, sink.dropped);
     }
 };

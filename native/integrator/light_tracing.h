@@ -7,19 +7,14 @@
 
 namespace vlp {
 
-// What a light path left in its slots: so many vertices, of which so many can be connected.
-struct LightPathCounts {
-    uint32_t vertices = 0, connectible = 0;
-};
-
 // Traces light path `path` of an iteration into slots[0], slots[1], ..., y_1 first, L at most. Each vertex that can be
 // connected is joined to the lens too, for sink.add(Splat), as far as sink.wanted(i) and sink.reaches(film). `stream` keeps
-// the pilot's paths apart from the render's.
+// the pilot's paths apart from the render's. Returns how many vertices are in the slots.
 template <typename Sink>
-VLP_HD inline LightPathCounts trace_light_path(const SceneView& scene, const PassSettings& pass, Stream stream,
-                                               uint32_t iteration, uint32_t path, LightVertex* slots, Sink& sink) {
-    LightPathCounts counts;
-    if (scene.light_count == 0) return counts;
+VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettings& pass, Stream stream,
+                                        uint32_t iteration, uint32_t path, LightVertex* slots, Sink& sink) {
+    uint32_t vertices = 0;
+    if (scene.light_count == 0) return 0;
 
     // The paths of an iteration are one stratified set.
     const uint32_t seed = hash(pass.seed, stream, iteration);
@@ -32,7 +27,7 @@ VLP_HD inline LightPathCounts trace_light_path(const SceneView& scene, const Pas
     const bool infinite = is_infinite(light);
 
     Rgb throughput = emission.weight * (1.0f / choice.pdf);
-    if (is_black(throughput) || !is_finite(throughput)) return counts;
+    if (is_black(throughput) || !is_finite(throughput)) return 0;
     const Rgb emitted_throughput = throughput;
 
     // y_0 as the weights see it. The end of a path at infinity is a direction: its density is per solid angle, and y_1
@@ -83,10 +78,9 @@ VLP_HD inline LightPathCounts trace_light_path(const SceneView& scene, const Pas
         vertex.primitive = y.primitive;
         vertex.rev_ratio = 0;
         vertex.packed = (i << LightVertex::k_index_shift) | y.material;
-        counts.vertices = i;
+        vertices = i;
         if (material.has_finite) {  // Listing 2: save a VLP
             vertex.packed |= LightVertex::k_connectible;
-            ++counts.connectible;
             if (sink.wanted(i)) {
                 lens_sampler.dimension = i;
                 connect_to_lens(scene, pass, vertex, y, -ray.direction, lens_sampler.next_2d(), sink);
@@ -119,7 +113,7 @@ VLP_HD inline LightPathCounts trace_light_path(const SceneView& scene, const Pas
         from = anchor_of(y);
         ray = {leave(from, next.direction), next.direction};
     }
-    return counts;
+    return vertices;
 }
 
 }  // namespace vlp

@@ -18,7 +18,7 @@ Pilot trace_pilot(const SceneView& scene, const PassSettings& pass) {
     double stored = 0, sum[3]{}, squares[3]{};
     for (uint32_t path = 0; path < k_pilot_paths; ++path) {
         NoSplats none;
-        const uint32_t vertices = trace_light_path(scene, pass, k_pilot_stream, 0, path, slots.data(), none).vertices;
+        const uint32_t vertices = trace_light_path(scene, pass, k_pilot_stream, 0, path, slots.data(), none);
         for (const LightVertex& vlp : std::span(slots).first(vertices)) {
             if (!vlp.connectible()) continue;
             ++stored;
@@ -33,7 +33,7 @@ Pilot trace_pilot(const SceneView& scene, const PassSettings& pass) {
         const double mean = sum[axis] / stored;
         const double half = std::sqrt(3 * std::max(squares[axis] / stored - mean * mean, 0.0));
         (&pilot.grid.low.x)[axis] = static_cast<float>(mean - half);
-        (&pilot.grid.cells_per_metre.x)[axis] = half > 0 ? static_cast<float>(2 / half) : 0.0f;
+        (&pilot.grid.cells_per_metre.x)[axis] = half > 1e-30 ? static_cast<float>(2 / half) : 0.0f;
     }
     return pilot;
 }

@@ -108,8 +108,8 @@ PassSettings for_scene(const SceneView& scene, PassSettings pass);
 // What light paths of a stream of their own find: the same on every machine.
 struct Pilot {
     float vlps_per_path = 0;
-    VlpGrid
-        grid;  // four cells along each axis over sqrt(3) standard deviations around the mean: all, were they spread evenly
+    // Four cells along each axis, over sqrt(3) standard deviations on either side of the mean: all VLPs, were they even.
+    VlpGrid grid;
 };
 Pilot trace_pilot(const SceneView& scene, const PassSettings& pass);
 

@@ -49,7 +49,7 @@ void StrategyRenderer::iterate(uint32_t iteration) {
     LightSink splats{*this};
     uint32_t end = 0;
     for (uint32_t path = 0; path < pass_.light_paths && pass_.traces_light(); ++path) {
-        end += trace_light_path(scene, pass_, k_light_stream, iteration, path, &slots_[end], splats).vertices;
+        end += trace_light_path(scene, pass_, k_light_stream, iteration, path, &slots_[end], splats);
     }
     std::vector<uint32_t> groups(k_vlp_groups + 1);
     count_groups(pass_.vlp_grid, slots_.data(), 0, end, groups.data(), 1);
