@@ -39,9 +39,8 @@ static_assert(k_max_walk <= UINT8_MAX);
 // Light paths that are listed by one thread, and how many threads that makes.
 struct ListingRuns {
     static constexpr uint32_t k_most = 4096, k_least_paths = 32;
-    uint32_t paths = 0, count = 0;
+    uint32_t paths, count;
 
-    ListingRuns() = default;
     explicit ListingRuns(uint32_t light_paths)
         : paths(max_of(k_least_paths, (light_paths + k_most - 1) / k_most)), count((light_paths + paths - 1) / paths) {}
     // The size of the table of vlp_groups.h, with V at its end.

@@ -29,11 +29,17 @@ Pilot trace_pilot(const SceneView& scene, const PassSettings& pass) {
         }
     }
     Pilot pilot{static_cast<float>(stored / k_pilot_paths), {}};
-    for (int axis = 0; axis < 3 && stored > 0; ++axis) {
+    if (stored == 0) return pilot;
+    double half[3];
+    for (int axis = 0; axis < 3; ++axis) {
         const double mean = sum[axis] / stored;
-        const double half = std::sqrt(3 * std::max(squares[axis] / stored - mean * mean, 0.0));
-        (&pilot.grid.low.x)[axis] = static_cast<float>(mean - half);
-        (&pilot.grid.cells_per_metre.x)[axis] = half > 1e-30 ? static_cast<float>(2 / half) : 0.0f;
+        half[axis] = std::sqrt(3 * std::max(squares[axis] / stored - mean * mean, 0.0));
+        (&pilot.grid.low.x)[axis] = static_cast<float>(mean - half[axis]);
+    }
+    // Across a plane rounding alone would choose the cell.
+    const double least = std::max(1e-4 * *std::max_element(half, half + 3), 1e-30);
+    for (int axis = 0; axis < 3; ++axis) {
+        if (half[axis] > least) (&pilot.grid.cells_per_metre.x)[axis] = static_cast<float>(2 / half[axis]);
     }
     return pilot;
 }

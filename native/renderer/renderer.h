@@ -108,7 +108,8 @@ PassSettings for_scene(const SceneView& scene, PassSettings pass);
 // What light paths of a stream of their own find: the same on every machine.
 struct Pilot {
     float vlps_per_path = 0;
-    // Four cells along each axis, over sqrt(3) standard deviations on either side of the mean: all VLPs, were they even.
+    // Four cells along each axis, over sqrt(3) standard deviations on either side of the mean: all VLPs, were they even. One
+    // along an axis on which they hardly spread.
     VlpGrid grid;
 };
 Pilot trace_pilot(const SceneView& scene, const PassSettings& pass);

@@ -26,10 +26,10 @@ def load(name: str, film: Film | None = None) -> Scene:
     return scene
 
 
-def renderer(scene: Scene, device: str = DEVICE, iterations: int = 4, **values: object) -> Renderer:
-    """After `iterations` on the device itself: no other took its place."""
+def renderer(scene: Scene, device: str = DEVICE, iterations: int = 4, first: int = 0, **values: object) -> Renderer:
+    """After `iterations` from `first` on, on the device itself: no other took its place."""
     settings = RenderSettings.from_dict({"samples": iterations, "device": device, "filter": "BOX", **values})
-    made = Renderer(scene, settings)
+    made = Renderer(scene, settings, first_iteration=first)
     assert made.iterate(iterations) == iterations
     assert not made.warnings
     assert made.statistics.dropped == 0

@@ -78,9 +78,7 @@ def test_ranges_add_up_to_the_whole() -> None:
     scene = load("indirect_room")
     whole = renderer(scene, iterations=6, adaptive=False)
     first = renderer(scene, iterations=2, adaptive=False)
-    options = RenderSettings(samples=4, device=DEVICE, filter="BOX", adaptive=False)  # type: ignore[arg-type]
-    rest = Renderer(scene, options, first_iteration=2)
-    rest.iterate(4)
+    rest = renderer(scene, iterations=4, first=2, adaptive=False)
     first.add_film_state(rest.film_state(), 4)
     np.testing.assert_array_equal(first.film_state(), whole.film_state())
 
