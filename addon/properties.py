@@ -76,7 +76,7 @@ _DEFAULTS = {
     "light_path_length": 12,
     "eye_path_length": 16,
     "vlp_connections": 1,
-    "vlp_candidates": 1,
+    "vlp_candidates": 8,
     "light_samples": 1,
     "splats": True,
     "roulette": True,

@@ -19,15 +19,16 @@ constexpr uint32_t k_paths_per_piece = 1024;
 constexpr uint32_t k_tile = 16;  // pixels a side
 constexpr uint32_t k_rows = 16;  // of the film that are cleared or committed at a time
 
-// Memory for light vertices on cache-line boundaries, left uninitialised: the light pass writes every slot.
+// Memory on cache-line boundaries, left uninitialised: what is read has been written before.
 struct AlignedDeleter {
-    void operator()(LightVertex* p) const { ::operator delete[](p, std::align_val_t{alignof(LightVertex)}); }
+    void operator()(void* p) const { ::operator delete(p, std::align_val_t{64}); }
 };
-using LightVertexBuffer = std::unique_ptr<LightVertex[], AlignedDeleter>;
+template <typename T>
+using RawArray = std::unique_ptr<T[], AlignedDeleter>;
 
-LightVertexBuffer allocate_light_vertices(size_t count) {
-    return LightVertexBuffer(static_cast<LightVertex*>(
-        ::operator new[](count * sizeof(LightVertex), std::align_val_t{alignof(LightVertex)})));
+template <typename T>
+RawArray<T> allocate(size_t count) {
+    return RawArray<T>(count > 0 ? static_cast<T*>(::operator new(count * sizeof(T), std::align_val_t{64})) : nullptr);
 }
 
 // Every other bit of `code`, gathered: a coordinate of a Morton code.
@@ -79,9 +80,10 @@ public:
         scene_ = scene.view();
         pass_ = pass;
         const size_t capacity = pass.kappa > 0 ? light_vertex_capacity(pass) : 0;
-        if (stored_.size() != capacity) {
-            slots_ = capacity > 0 ? allocate_light_vertices(capacity) : nullptr;
-            stored_ = std::vector<uint32_t>(capacity);
+        if (capacity_ != capacity) {
+            slots_ = allocate<LightVertex>(capacity);
+            stored_ = allocate<VlpCandidate>(capacity);
+            capacity_ = capacity;
         }
         vertices_in_piece_ = std::vector<uint32_t>(piece_count(pass));
         groups_ = std::vector<uint32_t>(groups_table(pass));
@@ -123,7 +125,7 @@ public:
 
     void add_memory(MemoryByDevice& memory) const override {
         MemoryUse& cpu = memory["CPU"];
-        cpu.light_vertices += stored_.capacity() * (sizeof(LightVertex) + sizeof(uint32_t));
+        cpu.light_vertices += capacity_ * (sizeof(LightVertex) + sizeof(VlpCandidate));
         cpu.film += moments_.size() * (sizeof(PixelMoments) + sizeof(int8_t));
         cpu.work +=
             (vertices_in_piece_.capacity() + groups_.capacity()) * sizeof(uint32_t) + tiles_.capacity() * sizeof(Tile);
@@ -169,9 +171,9 @@ private:
         });
         std::exclusive_scan(groups_.begin(), groups_.end(), groups_.begin(), 0u);
         pool_.run(pieces, [&](uint32_t i) {
-            list_groups(pass_.vlp_grid, slots_.get(), first_slot(i), end_of(i), &groups_[i], pieces, stored_.data());
+            list_groups(scene_, pass_, slots_.get(), first_slot(i), end_of(i), &groups_[i], pieces, stored_.get());
         });
-        return {slots_.get(), stored_.data(), groups_.back()};
+        return {slots_.get(), stored_.get(), groups_.back()};
     }
 
     void run_tile(const SampleRates& rates, Film& film, const LightVertexCache& cache, Tile tile) {
@@ -217,8 +219,9 @@ private:
     SceneView scene_;
     PassSettings pass_;
     ThreadPool pool_;
-    LightVertexBuffer slots_;
-    std::vector<uint32_t> stored_;
+    RawArray<LightVertex> slots_;
+    RawArray<VlpCandidate> stored_;
+    size_t capacity_ = 0;  // of both
     std::vector<uint32_t> vertices_in_piece_;
     std::vector<uint32_t> groups_;  // the table of vlp_groups.h, a column for each piece; V last
     std::vector<Tile> tiles_;
@@ -235,7 +238,8 @@ std::unique_ptr<Backend> make_cpu_backend(const Scene& scene, const PassSettings
 void add_cpu_memory(MemoryByDevice& memory, Window window, const PassSettings& pass) {
     MemoryUse& cpu = memory["CPU"];
     cpu.film += sample_plan_bytes(window, pass);
-    if (pass.kappa > 0) cpu.light_vertices += light_vertex_capacity(pass) * (sizeof(LightVertex) + sizeof(uint32_t));
+    if (pass.kappa > 0)
+        cpu.light_vertices += light_vertex_capacity(pass) * (sizeof(LightVertex) + sizeof(VlpCandidate));
     cpu.work += (piece_count(pass) + groups_table(pass)) * sizeof(uint32_t) +
                 size_t{tiles_along(window.width)} * tiles_along(window.height) * sizeof(Tile);
 }

@@ -265,8 +265,7 @@ private:
     // Lists the light vertices that can be connected, by their groups.
     void list_stored() {
         const ListingRuns runs(pass_.light_paths);
-        const CountStored count{runs,          pass_.light_paths,        pass_.light_path_length, pass_.vlp_grid,
-                                slots_.data(), vertices_in_path_.data(), groups_.data()};
+        const CountStored count{scene_, pass_, runs, slots_.data(), vertices_in_path_.data(), groups_.data()};
         device_.clear(groups_.data(), groups_.bytes());
         device_.launch(0, runs.count, count);
         device_.scan(groups_.data(), static_cast<uint32_t>(groups_.size()), scratch_.data(), scratch_.bytes());
@@ -294,7 +293,8 @@ private:
     Window window_;
     ByPart<Part> parts_;
     Buffer<LightVertex> slots_;
-    Buffer<uint32_t> stored_, groups_;
+    Buffer<VlpCandidate> stored_;
+    Buffer<uint32_t> groups_;
     Buffer<uint8_t> vertices_in_path_;
     Buffer<std::byte> scratch_;
     Buffer<PixelSample> frame_;

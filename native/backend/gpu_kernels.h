@@ -49,9 +49,9 @@ struct ListingRuns {
 
 // Counts the groups of the VLPs of run `run`, a column of `groups`.
 struct CountStored {
+    SceneView scene;
+    PassSettings pass;
     ListingRuns runs;
-    uint32_t light_paths, light_path_length;
-    VlpGrid grid;
     const LightVertex* slots;
     const uint8_t* vertices_in_path;
     uint32_t* groups;
@@ -59,15 +59,15 @@ struct CountStored {
     // visit(begin, end) for the slots of each of its paths.
     template <typename Visit>
     VLP_HD void for_paths(uint32_t run, const Visit& visit) const {
-        const uint32_t end = min_of((run + 1) * runs.paths, light_paths);
+        const uint32_t end = min_of((run + 1) * runs.paths, pass.light_paths);
         for (uint32_t path = run * runs.paths; path < end; ++path) {
-            const uint32_t first = path * light_path_length;
+            const uint32_t first = path * pass.light_path_length;
             visit(first, first + vertices_in_path[path]);
         }
     }
     VLP_HD void operator()(uint32_t run) const {
         for_paths(run, [&](uint32_t begin, uint32_t end) {
-            count_groups(grid, slots, begin, end, groups + run, runs.count);
+            count_groups(pass.vlp_grid, slots, begin, end, groups + run, runs.count);
         });
     }
 };
@@ -75,13 +75,13 @@ struct CountStored {
 // Lists them, once `groups` has been summed. One run tells V.
 struct ListStored {
     CountStored counted;
-    uint32_t* stored;
+    VlpCandidate* stored;
     PassCounts* counts;
 
     VLP_HD void operator()(uint32_t run) const {
         const CountStored& of = counted;
         of.for_paths(run, [&](uint32_t begin, uint32_t end) {
-            list_groups(of.grid, of.slots, begin, end, of.groups + run, of.runs.count, stored);
+            list_groups(of.scene, of.pass, of.slots, begin, end, of.groups + run, of.runs.count, stored);
         });
         if (run == 0) counts->stored_vlps = of.groups[size_t{k_vlp_groups} * of.runs.count];
     }
@@ -94,7 +94,7 @@ struct EyePass {
     SampleRates rates;
     Window window;
     LightVertex* slots;
-    const uint32_t* stored;
+    const VlpCandidate* stored;
     PixelSample* frame;
     GuideSample* guides;  // null without GuidedSink
     PassCounts* counts;

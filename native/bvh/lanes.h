@@ -2,14 +2,8 @@
 #pragma once
 
 #include "bvh/traversal_ray.h"
+#include "core/simd.h"
 #include "geometry/sphere.h"
-
-#if defined(__AVX2__) && !VLP_ON_DEVICE
-#define VLP_AVX2 1
-#include <immintrin.h>
-#else
-#define VLP_AVX2 0
-#endif
 
 namespace vlp {
 

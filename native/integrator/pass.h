@@ -54,11 +54,21 @@ VLP_HD inline Rgb clamped(const PassSettings& pass, uint32_t n, Rgb light) {
     return most > 0 && size > most ? light * (most / size) : light;
 }
 
-// The virtual light points of one iteration. A path's hits follow one another in the slots; `stored` lists the slots that
-// can be connected, in the order of vlp_groups.h.
+// A VLP as one of those that a connection chooses from, see vlp_candidates.h.
+struct alignas(32) VlpCandidate {
+    Vec3 position;
+    OctNormal normal;  // towards the side that its light comes from
+    uint32_t red_and_green, blue_and_behind;  // what it reflects, and what share of that counts on the other side
+    float others;
+    uint32_t slot;
+};
+static_assert(sizeof(VlpCandidate) == 32, "a cache line holds two, a vector register one");
+
+// The virtual light points of one iteration. A path's hits follow one another in the slots; `stored` lists those that can be
+// connected, in the order of vlp_groups.h.
 struct LightVertexCache {
-    LightVertex* slots = nullptr;
-    const uint32_t* stored = nullptr;
+    const LightVertex* slots = nullptr;
+    const VlpCandidate* stored = nullptr;
     uint32_t stored_count = 0;  // V
 };
 

@@ -76,13 +76,13 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
 
         const Bsdf bsdf = make_bsdf(scene, z);
         if (scene.materials[z.material].has_finite) {  // Listing 3: sample lights and VLPs
-            const auto draw_vlp = [&](uint32_t i) {
+            const Receiver receiver = has_vlps ? make_receiver(scene, pass, eye) : Receiver{};
+            const auto choose_vlp = [&](uint32_t i) {
                 sampler.dimension = first_draw + 2 * (pass.light_samples + i);
                 const uint32_t u_vlp = sampler.next_bits();
-                prefetch_virtual_light_points(cache, pass.vlp_candidates, u_vlp);
-                return u_vlp;
+                return choose_virtual_light_point(pass, cache, receiver, u_vlp, sampler.next());
             };
-            uint32_t u_next_vlp = has_vlps ? draw_vlp(0) : 0;
+            VlpChoice next_vlp = has_vlps ? choose_vlp(0) : VlpChoice{};
             sampler.dimension = first_draw;
             for (uint32_t i = 0; scene.light_count > 0 && i < pass.light_samples; ++i) {
                 const uint32_t u_light = sampler.next_bits();
@@ -91,11 +91,9 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
                 sink.add(c);
             }
             for (uint32_t i = 0; has_vlps && i < pass.vlp_connections; ++i) {
-                const uint32_t u_vlp = u_next_vlp;
-                sampler.dimension = first_draw + 2 * (pass.light_samples + i) + 1;
-                const float u_keep = pass.vlp_candidates > 1 ? sampler.next() : 0.0f;
-                if (i + 1 < pass.vlp_connections) u_next_vlp = draw_vlp(i + 1);
-                Contribution c = connect_virtual_light_point(scene, pass, cache, eye, bsdf, u_vlp, u_keep);
+                const VlpChoice vlp = next_vlp;
+                if (i + 1 < pass.vlp_connections) next_vlp = choose_vlp(i + 1);
+                Contribution c = connect_virtual_light_point(scene, pass, cache, eye, bsdf, vlp);
                 c.value *= 1.0f / static_cast<float>(pass.vlp_connections);
                 sink.add(c);
             }

@@ -3,7 +3,7 @@
 
 #include "bsdf/bsdf.h"
 #include "integrator/trace.h"
-#include "integrator/weights.h"
+#include "integrator/vlp_candidates.h"
 
 namespace vlp {
 
@@ -63,11 +63,11 @@ struct VlpConnection {
     Vec3 direction;  // unit, to it
 };
 
-// Stored VLP number `index` as if it stood for all V of an iteration.
+// With nothing between.
 VLP_HD inline VlpConnection join_unshadowed(const SceneView& scene, const PassSettings& pass,
                                             const LightVertexCache& cache, const EyeWalk& eye, const Bsdf& eye_bsdf,
-                                            uint32_t index) {
-    const LightVertex* vlp = cache.slots + cache.stored[index];
+                                            VlpChoice choice) {
+    const LightVertex* vlp = cache.slots + choice.slot;
     const SurfacePoint point = surface_of(*vlp);
     const Edge edge = edge_between(eye.surface.position, point.position);
     VlpConnection joined{{.s = vlp->index() + 1, .t = eye.t, .vlp = vlp}, anchor_of(point), edge.direction};
@@ -82,57 +82,34 @@ VLP_HD inline VlpConnection join_unshadowed(const SceneView& scene, const PassSe
     const LobeValue at_vlp = evaluate(make_bsdf(scene, point), -edge.direction, decode(vlp->to_previous));
     if (is_black(at_vlp.f)) return joined;
 
-    const float vlps_per_path = static_cast<float>(cache.stored_count) / static_cast<float>(pass.light_paths);
-    found.value = eye.throughput * at_eye.f * at_vlp.f * vlp->throughput * (geometry * vlps_per_path);
+    const float paths = choice.stands_for / static_cast<float>(pass.light_paths);
+    found.value = eye.throughput * at_eye.f * at_vlp.f * vlp->throughput * (geometry * paths);
     found.weight = connection_weight(pass, eye, at_eye, vlp, at_vlp, edge, cos_eye, cos_vlp);
     return joined;
 }
 
-// Candidate `i` of the M of a connection that draws `u`: one of the V stored VLPs, from the i-th stratum of them.
-VLP_HD inline uint32_t candidate_index(const LightVertexCache& cache, uint32_t candidates, uint32_t i, uint32_t u) {
-    const uint64_t stratum = ((static_cast<uint64_t>(i) << 32) + u) / candidates;
-    return static_cast<uint32_t>((stratum * cache.stored_count) >> 32);
+// z_{t-1} as VLPs may light it.
+VLP_HD inline Receiver make_receiver(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye) {
+    const Material& material = scene.materials[eye.surface.material];
+    const float cos_previous = dot(eye.surface.geometric_normal, eye.w_eye);
+    StrategySum sum = strategy_sum(pass, strategy_count(pass, 2));
+    add_longer_light_walks(sum, pass, eye.vertices, eye.t + 2, 3, k_inv_pi / eye.last().pdf_area,
+                           std::fabs(cos_previous) * k_inv_pi * eye.last().rev_geometry);
+    return {eye.surface.position, eye.surface.geometric_normal * (cos_previous < 0 ? -1.0f : 1.0f),
+            detail::share_behind(material), eye.throughput * material.albedo, sum.sum - 1};
 }
 
-// Asks for the memory of the VLPs that a connection will read, which lie anywhere: a light sample takes as long as they
-// take to arrive.
-VLP_HD inline void prefetch_virtual_light_points([[maybe_unused]] const LightVertexCache& cache,
-                                                 [[maybe_unused]] uint32_t candidates, [[maybe_unused]] uint32_t u) {
-#if !VLP_ON_DEVICE
-    for (uint32_t i = 0; i < candidates; ++i) {
-        const LightVertex* vlp = cache.slots + cache.stored[candidate_index(cache, candidates, i, u)];
-        __builtin_prefetch(vlp);
-        __builtin_prefetch(vlp - 1);  // the weights look at the vertices before it
-    }
-#endif
-}
-
-// One of the C connections at z_{t-1}: of M candidates, drawn evenly over the V stored VLPs, one is kept in proportion to the
-// light that it would bring if nothing stood between (Talbot, Cline & Egbert 2005), and a ray is sent to that one. The
-// estimate is of what all VLPs of an iteration bring; the caller averages over C. One candidate stands for V VLPs of
-// N paths, and the one that is kept for all M.
+// One of the C connections at z_{t-1}: of M candidates, drawn evenly over the V stored VLPs, one is kept in proportion to
+// what it promises, and a ray is sent to that one. The estimate is of what all VLPs of an iteration bring; the caller
+// averages over C.
 VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, const PassSettings& pass,
                                                        const LightVertexCache& cache, const EyeWalk& eye,
-                                                       const Bsdf& eye_bsdf, uint32_t u, float u_keep) {
-    const uint32_t candidates = pass.vlp_candidates;
-    VlpConnection kept{{.t = eye.t}, {}, {}};
-    float kept_light = 0, light = 0;
-    for (uint32_t i = 0; i < candidates; ++i) {
-        const uint32_t index = candidate_index(cache, candidates, i, u);
-        const VlpConnection next = join_unshadowed(scene, pass, cache, eye, eye_bsdf, index);
-        const float next_light = average(next.found.value * next.found.weight);
-        if (!is_finite(next_light)) return next.found;  // for the sink to count
-        if (!(next_light > 0)) continue;
-        light += next_light;
-        const float chance = next_light / light;
-        const bool keep = u_keep < chance;
-        u_keep = keep ? u_keep / chance : (u_keep - chance) / (1 - chance);
-        if (keep) kept = next, kept_light = next_light;
-    }
-    if (!(kept_light > 0)) return kept.found;
-    const Rgb through = transmittance(scene, anchor_of(eye.surface), kept.vlp, kept.direction);
-    kept.found.value *= through * (light / (kept_light * static_cast<float>(candidates)));
-    return kept.found;
+                                                       const Bsdf& eye_bsdf, VlpChoice choice) {
+    if (!(choice.stands_for > 0)) return {.t = eye.t};
+    VlpConnection joined = join_unshadowed(scene, pass, cache, eye, eye_bsdf, choice);
+    if (is_black(joined.found.value)) return joined.found;
+    joined.found.value *= transmittance(scene, anchor_of(eye.surface), joined.vlp, joined.direction);
+    return joined.found;
 }
 
 }  // namespace vlp

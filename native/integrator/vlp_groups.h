@@ -2,7 +2,7 @@
 // spread evenly over the list, so they are spread over the scene as well.
 #pragma once
 
-#include "integrator/pass.h"
+#include "integrator/vlp_candidates.h"
 
 namespace vlp {
 
@@ -38,10 +38,12 @@ VLP_HD inline void count_groups(const VlpGrid& grid, const LightVertex* slots, u
         if (slots[slot].connectible()) ++column[size_t{stride} * group_of(grid, slots[slot])];
     }
 }
-VLP_HD inline void list_groups(const VlpGrid& grid, const LightVertex* slots, uint32_t begin, uint32_t end,
-                               uint32_t* column, uint32_t stride, uint32_t* stored) {
+VLP_HD inline void list_groups(const SceneView& scene, const PassSettings& pass, const LightVertex* slots,
+                               uint32_t begin, uint32_t end, uint32_t* column, uint32_t stride, VlpCandidate* stored) {
     for (uint32_t slot = begin; slot < end; ++slot) {
-        if (slots[slot].connectible()) stored[column[size_t{stride} * group_of(grid, slots[slot])]++] = slot;
+        if (!slots[slot].connectible()) continue;
+        stored[column[size_t{stride} * group_of(pass.vlp_grid, slots[slot])]++] =
+            make_candidate(scene, pass, slots, slot);
     }
 }
 

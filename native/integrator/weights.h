@@ -18,15 +18,15 @@
 
 namespace vlp {
 
-// What a draw counts in the weights beside a light sample's or a splat's: those of the VLPs are spread evenly over the scene
-// and have less noise than the densities say, those that meet a light by chance have more. Any counts are unbiased.
-inline constexpr float k_hit_worth = 0.5f, k_vlp_worth = 2.0f;
+// What a hit counts in the weights beside other draws: those that meet a light by chance have more noise than the densities
+// say. Any count is unbiased.
+inline constexpr float k_hit_worth = 0.5f;
 
-// How often an iteration draws a strategy for a pixel, times the draws' worth: hits once, S light samples, kappa draws of a
-// virtual light point. 0: it is switched off. Those with t = 1 are counted by splat_count.
+// How often an iteration draws a strategy for a pixel: hits once, S light samples, kappa draws of a virtual light point.
+// 0: it is switched off. Those with t = 1 are counted by splat_count.
 VLP_HD inline float strategy_count(const PassSettings& pass, uint32_t s) {
     if (s == 0) return pass.hits ? k_hit_worth : 0.0f;
-    return s == 1 ? static_cast<float>(pass.light_samples) : k_vlp_worth * pass.kappa;
+    return s == 1 ? static_cast<float>(pass.light_samples) : pass.kappa;
 }
 
 // Whether the vertices y_i of light paths splat. Those of direct light, i = 1, do so only where there is no next event,

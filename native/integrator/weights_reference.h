@@ -114,7 +114,7 @@ inline double film_density(const Camera& camera, const PathVertex& z_1) {
     return std::fabs(determinant) / (dot(a, a) * depth * depth) * per_plane;
 }
 
-// Densities of every strategy k = 0 ... n - 1, times its count and worth; 0 for those that cannot make the path.
+// Densities of every strategy k = 0 ... n - 1, times its count, half of that for hits; 0 for those that cannot make the path.
 inline std::vector<double> strategy_densities(const SceneView& scene, const PassSettings& pass, const Path& path) {
     const uint32_t n = path.size();
     const Light& light = scene.lights[path.light];
@@ -164,7 +164,7 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
         if (k == 2 && n == 3 && pass.light_samples > 0) continue;  // direct light is left to next event
         if (k == 1 && x_1.specular) continue;
         if (k >= 2 && (path.x[k - 1].specular || path.x[k].specular)) continue;
-        double density = k == 0 ? 0.5 : k == 1 ? double(pass.light_samples) : 2 * double{pass.kappa};
+        double density = k == 0 ? 0.5 : k == 1 ? double(pass.light_samples) : double{pass.kappa};
         if (k > 0 && k == n - 1) density = double(pass.light_paths);
         for (uint32_t i = 0; i < n; ++i) density *= i >= k ? by_eye[i] : k == 1 ? next_event : by_light[i];
         densities[k] = density;

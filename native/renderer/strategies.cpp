@@ -54,7 +54,7 @@ void StrategyRenderer::iterate(uint32_t iteration) {
     std::vector<uint32_t> groups(k_vlp_groups + 1);
     count_groups(pass_.vlp_grid, slots_.data(), 0, end, groups.data(), 1);
     std::exclusive_scan(groups.begin(), groups.end(), groups.begin(), 0u);
-    list_groups(pass_.vlp_grid, slots_.data(), 0, end, groups.data(), 1, stored_.data());
+    list_groups(scene, pass_, slots_.data(), 0, end, groups.data(), 1, stored_.data());
     const LightVertexCache cache{slots_.data(), stored_.data(), groups.back()};
     pool_.run(window_.height, [&](uint32_t y) {
         for (uint32_t x = 0; x < window_.width; ++x) {

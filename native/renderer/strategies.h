@@ -37,7 +37,7 @@ private:
     Window window_;
     ThreadPool pool_;
     std::vector<LightVertex> slots_;
-    std::vector<uint32_t> stored_;
+    std::vector<VlpCandidate> stored_;
     std::vector<float> sums_;
     uint32_t iterations_ = 0;
 };

@@ -40,8 +40,10 @@ struct Material {
     uint32_t lobe_count = 0;      // without the transparent ones, which are summed up below
     bool has_specular = false;    // some lobe is a delta distribution
     bool has_finite = false;      // some lobe is not: the surface can be connected and hold VLPs
+    bool transmits = false;       // some finite lobe lets light through to the other side
     float pass_through = 0;       // probability that a path goes straight through
     Rgb transparency;  // what passes straight through, for connection rays; weight / pass_through for paths
+    Rgb albedo;  // about what finite lobes scatter of light from everywhere, nowhere 0
     Rgb emission;  // radiance on both sides
 };
 

@@ -121,8 +121,14 @@ Material build_material(std::span<const LobeInput> input, Rgb emission, std::vec
         lobe.selection = total > 0 ? lobe.selection / total : 0.0f;
         if (lobe.layered_under >= 0) lobe.layered_under = place[static_cast<size_t>(lobe.layered_under)];
         (is_specular(lobe) ? material.has_specular : material.has_finite) = true;
+        if (!is_specular(lobe)) {
+            material.transmits |= lobe.kind != LobeKind::diffuse && lobe.kind != LobeKind::reflection;
+            material.albedo += mean_albedo(all, all[i]);
+        }
         lobes.push_back(lobe);
     }
+    constexpr float k_least_albedo = 1e-2f;  // what is 0 on average may not be in all directions
+    for (float* c : {&material.albedo.r, &material.albedo.g, &material.albedo.b}) *c = std::max(*c, k_least_albedo);
     const float straight = average(material.transparency);
     material.pass_through = straight > 0 ? straight / (straight + total) : 0.0f;
     return material;

@@ -71,8 +71,8 @@ class ModePreset:
 
 MODE_PRESETS: dict[Mode, ModePreset] = {
     Mode.PAPER: ModePreset(1, 5, 1, 1, 1, False, False, False, Weighting.UNIFORM, 1, light_vertices=1 << 23),
-    Mode.BALANCED: ModePreset(12, 16, 1, 1, 1, True, True, True, Weighting.BALANCE, 8, light_vertices=1 << 23),
-    Mode.REFERENCE: ModePreset(64, 64, 1, 1, 1, True, True, False, Weighting.BALANCE, 4, light_vertices=1 << 21),
+    Mode.BALANCED: ModePreset(12, 16, 1, 8, 1, True, True, True, Weighting.BALANCE, 8, light_vertices=1 << 23),
+    Mode.REFERENCE: ModePreset(64, 64, 1, 8, 1, True, True, False, Weighting.BALANCE, 4, light_vertices=1 << 21),
 }
 
 # The least and the most that a number may be, both allowed.

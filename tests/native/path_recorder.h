@@ -34,7 +34,7 @@ struct SplatRecorder {
 // The light pass of one iteration.
 struct TracedLight {
     std::vector<LightVertex> slots;
-    std::vector<uint32_t> stored;
+    std::vector<VlpCandidate> stored;
     std::vector<SplatRecorder::Found> splats;
     LightVertexCache cache;
 
@@ -47,7 +47,7 @@ struct TracedLight {
         }
         splats = std::move(recorder.found);
         for (uint32_t i = 0; i < slots.size(); ++i) {
-            if (slots[i].connectible()) stored.push_back(i);
+            if (slots[i].connectible()) stored.push_back(make_candidate(scene, pass, slots.data(), i));
         }
         cache = {slots.data(), stored.data(), static_cast<uint32_t>(stored.size())};
     }

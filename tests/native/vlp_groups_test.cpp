@@ -66,6 +66,13 @@ TEST(VlpGroups, WhatLiesOutsideIsInTheNearestCell) {
 
 TEST(VlpGroups, RunsListEachOnceInOrder) {
     Random random{5};
+    Scene scene;
+    add_materials(scene);
+    scene.set_camera({});
+    scene.set_film(1, 1, {0, 0, 1, 1}, false);
+    scene.build(1);
+    PassSettings pass;
+    pass.vlp_grid = k_unit_grid;
     std::vector<LightVertex> slots;
     std::vector<uint32_t> expected;
     for (uint32_t i = 0; i < 5000; ++i) {
@@ -78,7 +85,8 @@ TEST(VlpGroups, RunsListEachOnceInOrder) {
     std::stable_sort(expected.begin(), expected.end(), [&](uint32_t a, uint32_t b) { return group(a) < group(b); });
     for (const std::vector<uint32_t>& ends : {std::vector<uint32_t>{5000}, {1, 1, 4000, 5000}}) {
         const auto runs = static_cast<uint32_t>(ends.size());
-        std::vector<uint32_t> table(size_t{k_vlp_groups} * runs + 1), stored(expected.size());
+        std::vector<uint32_t> table(size_t{k_vlp_groups} * runs + 1), slots_stored;
+        std::vector<VlpCandidate> stored(expected.size());
         const auto begin = [&](uint32_t run) { return run == 0 ? 0 : ends[run - 1]; };
         for (uint32_t i = 0; i < runs; ++i) {
             count_groups(k_unit_grid, slots.data(), begin(i), ends[i], &table[i], runs);
@@ -86,9 +94,10 @@ TEST(VlpGroups, RunsListEachOnceInOrder) {
         std::exclusive_scan(table.begin(), table.end(), table.begin(), 0u);
         EXPECT_EQ(table.back(), expected.size());
         for (uint32_t i = 0; i < runs; ++i) {
-            list_groups(k_unit_grid, slots.data(), begin(i), ends[i], &table[i], runs, stored.data());
+            list_groups(scene.view(), pass, slots.data(), begin(i), ends[i], &table[i], runs, stored.data());
         }
-        EXPECT_EQ(stored, expected);
+        for (const VlpCandidate& vlp : stored) slots_stored.push_back(vlp.slot);
+        EXPECT_EQ(slots_stored, expected);
     }
 }
 

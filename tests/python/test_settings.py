@@ -16,8 +16,8 @@ from vlp_bpt.settings import FROM_MODE, MODE_PRESETS, Device
     ("mode", "expected"),
     [
         (Mode.PAPER, (1, 5, 1, 1, 1, False, False, Weighting.UNIFORM, 5000)),
-        (Mode.BALANCED, (12, 16, 1, 1, 1, True, True, Weighting.BALANCE, 625)),
-        (Mode.REFERENCE, (64, 64, 1, 1, 1, True, True, Weighting.BALANCE, 1250)),
+        (Mode.BALANCED, (12, 16, 1, 8, 1, True, True, Weighting.BALANCE, 625)),
+        (Mode.REFERENCE, (64, 64, 1, 8, 1, True, True, Weighting.BALANCE, 1250)),
     ],
 )
 def test_a_mode_fills_what_is_open(mode: Mode, expected: tuple[Any, ...]) -> None:

@@ -1,0 +1,229 @@
+// What is known of a virtual light point before a connection to it is worked out: about how much light it would bring.
+//
+// A promise is the light of a connection, times its weight, as if both ends were Lambertian and nothing stood between them.
+// It only says which of several candidates is kept (Talbot, Cline & Egbert 2005): what it leaves out costs noise, not light,
+// as long as it is above 0 wherever there is light.
+#pragma once
+
+#include "core/bits.h"
+#include "core/simd.h"
+#include "integrator/weights.h"
+
+namespace vlp {
+
+// An eye vertex that VLPs may light.
+struct Receiver {
+    Vec3 position, normal;  // towards the side that is seen
+    float behind;  // share of the light from the other side that counts
+    Rgb wanted;  // what reflected light is multiplied by
+    float others;  // as VlpCandidate::others, for the strategies of more light vertices
+};
+
+namespace detail {
+
+// How much of light that goes through the surface counts. If nothing goes through, hardly ever a shading normal disagrees.
+VLP_HD inline float share_behind(const Material& material) { return material.transmits ? 1.0f : 1.0f / 64; }
+
+// Two numbers of 16 bits, the upper halves of floats. The first is read with the second's bits as its last ones.
+VLP_HD inline uint32_t pack_halves(float a, float b) {
+    return (static_cast<uint32_t>(bits_of(a)) & 0xffff0000u) | static_cast<uint32_t>(bits_of(b)) >> 16;
+}
+VLP_HD inline float first_half(uint32_t halves) { return float_of(static_cast<int32_t>(halves)); }
+VLP_HD inline float second_half(uint32_t halves) { return float_of(static_cast<int32_t>(halves << 16)); }
+
+}  // namespace detail
+
+// The VLP in `slot`. Strategies of fewer light vertices than the connection have, in sum, others * |cos cos| / dist^2 times its
+// density if both surfaces are Lambertian.
+VLP_HD inline VlpCandidate make_candidate(const SceneView& scene, const PassSettings& pass, const LightVertex* slots,
+                                          uint32_t slot) {
+    const LightVertex& vlp = slots[slot];
+    const Material& material = scene.materials[vlp.material()];
+    const Vec3 normal = decode(vlp.geometric_normal);
+    const float cos_previous = dot(normal, decode(vlp.to_previous));
+    const uint32_t s = vlp.index() + 1;
+    StrategySum sum = strategy_sum(pass, strategy_count(pass, s));
+    add_shorter_light_walks(sum, pass, &vlp, s, s + 1, k_inv_pi / vlp.pdf_area,
+                            std::fabs(cos_previous) * k_inv_pi * vlp.rev_geometry);
+    const Rgb reflected = vlp.throughput * material.albedo;
+    return {vlp.position,
+            encode(cos_previous < 0 ? -normal : normal),
+            detail::pack_halves(reflected.r, reflected.g),
+            detail::pack_halves(reflected.b, detail::share_behind(material)),
+            sum.sum - 1,
+            slot};
+}
+
+// How many candidates are looked at together.
+inline constexpr uint32_t k_candidates_at_once = 8;
+// So that sums of promises are finite.
+inline constexpr float k_most_promise = 1e30f;
+
+#if VLP_AVX2
+
+namespace detail {
+
+VLP_FORCE_INLINE __m256 magnitude(__m256 a) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), a); }
+VLP_FORCE_INLINE __m256 sign_from(__m256 magnitude, __m256 sign) {
+    return _mm256_or_ps(magnitude, _mm256_and_ps(_mm256_set1_ps(-0.0f), sign));
+}
+// A cosine, or as much of it as counts behind the surface.
+VLP_FORCE_INLINE __m256 facing(__m256 cosine, __m256 behind) {
+    return _mm256_blendv_ps(cosine, _mm256_mul_ps(magnitude(cosine), behind), cosine);
+}
+VLP_FORCE_INLINE __m256 dequantise(__m256i bits) {
+    return _mm256_mul_ps(_mm256_sub_ps(_mm256_cvtepi32_ps(bits), _mm256_set1_ps(32767.0f)),
+                         _mm256_set1_ps(1.0f / 32767.0f));
+}
+
+// Rows of eight records become their columns.
+VLP_FORCE_INLINE void transpose(__m256 (&r)[8]) {
+    __m256 pairs[8], quads[8];
+    for (int i = 0; i < 8; i += 2) {
+        pairs[i] = _mm256_unpacklo_ps(r[i], r[i + 1]);
+        pairs[i + 1] = _mm256_unpackhi_ps(r[i], r[i + 1]);
+    }
+    for (int i = 0; i < 8; i += 4) {
+        for (int k = 0; k < 2; ++k) {
+            quads[i + 2 * k] = _mm256_shuffle_ps(pairs[i + k], pairs[i + k + 2], 0x44);
+            quads[i + 2 * k + 1] = _mm256_shuffle_ps(pairs[i + k], pairs[i + k + 2], 0xee);
+        }
+    }
+    for (int i = 0; i < 4; ++i) {
+        r[i] = _mm256_permute2f128_ps(quads[i], quads[i + 4], 0x20);
+        r[i + 4] = _mm256_permute2f128_ps(quads[i], quads[i + 4], 0x31);
+    }
+}
+
+}  // namespace detail
+
+// promises[i]: that of candidate `index[i]` of `list`.
+VLP_FORCE_INLINE void promise(const Receiver& to, const VlpCandidate* list, const uint32_t* index, float* promises) {
+    static_assert(sizeof(VlpCandidate) == sizeof(__m256));
+    const auto all = [](float x) { return _mm256_set1_ps(x); };
+    __m256 row[8];
+    for (int i = 0; i < 8; ++i) row[i] = _mm256_load_ps(reinterpret_cast<const float*>(&list[index[i]]));
+    detail::transpose(row);
+    const __m256 dx = _mm256_sub_ps(row[0], all(to.position.x)), dy = _mm256_sub_ps(row[1], all(to.position.y)),
+                 dz = _mm256_sub_ps(row[2], all(to.position.z));
+    const __m256 inverse =
+        _mm256_div_ps(all(1), _mm256_fmadd_ps(dx, dx, _mm256_fmadd_ps(dy, dy, _mm256_mul_ps(dz, dz))));
+
+    // As `decode` does.
+    const __m256i bits = _mm256_castps_si256(row[3]);
+    __m256 nx = detail::dequantise(_mm256_and_si256(bits, _mm256_set1_epi32(0xffff)));
+    __m256 ny = detail::dequantise(_mm256_srli_epi32(bits, 16));
+    const __m256 ax = detail::magnitude(nx), ay = detail::magnitude(ny);
+    const __m256 nz = _mm256_sub_ps(_mm256_sub_ps(all(1), ax), ay);
+    nx = _mm256_blendv_ps(nx, detail::sign_from(_mm256_sub_ps(all(1), ay), nx), nz);
+    ny = _mm256_blendv_ps(ny, detail::sign_from(_mm256_sub_ps(all(1), ax), ny), nz);
+    const __m256 size = _mm256_sqrt_ps(_mm256_fmadd_ps(nx, nx, _mm256_fmadd_ps(ny, ny, _mm256_mul_ps(nz, nz))));
+
+    const auto toward = [&](__m256 x, __m256 y, __m256 z) {
+        return _mm256_fmadd_ps(dx, x, _mm256_fmadd_ps(dy, y, _mm256_mul_ps(dz, z)));
+    };
+    const auto upper = [](__m256 x) { return _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_castps_si256(x), 16)); };
+    const __m256 at_eye = detail::facing(toward(all(to.normal.x), all(to.normal.y), all(to.normal.z)), all(to.behind));
+    const __m256 at_vlp = detail::facing(_mm256_sub_ps(all(0), toward(nx, ny, nz)), upper(row[5]));
+    const __m256 geometry =
+        _mm256_div_ps(_mm256_mul_ps(_mm256_mul_ps(at_eye, inverse), _mm256_mul_ps(at_vlp, inverse)), size);
+    const __m256 light =
+        _mm256_fmadd_ps(all(to.wanted.r), row[4],
+                        _mm256_fmadd_ps(all(to.wanted.g), upper(row[4]), _mm256_mul_ps(all(to.wanted.b), row[5])));
+    const __m256 others = _mm256_add_ps(row[6], all(to.others));
+    const __m256 weighted = _mm256_div_ps(_mm256_mul_ps(light, geometry), _mm256_fmadd_ps(others, geometry, all(1)));
+    // In this order NaN becomes 0.
+    _mm256_storeu_ps(promises, _mm256_min_ps(_mm256_max_ps(weighted, all(0)), all(k_most_promise)));
+}
+
+#else
+
+VLP_HD inline void promise(const Receiver& to, const VlpCandidate* list, const uint32_t* index, float* promises) {
+    const auto facing = [](float cosine, float behind) { return cosine < 0 ? -cosine * behind : cosine; };
+    for (uint32_t i = 0; i < k_candidates_at_once; ++i) {
+        const VlpCandidate& c = list[index[i]];
+        const Vec3 d = c.position - to.position;
+        const float inverse = 1 / length_squared(d);
+        const float geometry = facing(dot(to.normal, d), to.behind) * inverse *
+                               (facing(-dot(decode(c.normal), d), detail::second_half(c.blue_and_behind)) * inverse);
+        const Rgb reflected{detail::first_half(c.red_and_green), detail::second_half(c.red_and_green),
+                            detail::first_half(c.blue_and_behind)};
+        const Rgb brought = reflected * to.wanted;
+        const float light = brought.r + brought.g + brought.b;
+        const float weighted = light * geometry / (1 + (c.others + to.others) * geometry);
+        promises[i] = weighted > 0 ? min_of(weighted, k_most_promise) : 0.0f;
+    }
+}
+
+#endif
+
+// Candidate `i` of the M of a connection that draws `u`: one of the V stored VLPs, from the i-th stratum of them.
+VLP_HD inline uint32_t candidate_index(const LightVertexCache& cache, uint32_t candidates, uint32_t i, uint32_t u) {
+    const uint64_t stratum = ((static_cast<uint64_t>(i) << 32) + u) / candidates;
+    return static_cast<uint32_t>((stratum * cache.stored_count) >> 32);
+}
+
+// Asks for the memory of the candidates, which lie anywhere.
+VLP_HD inline void prefetch_candidates([[maybe_unused]] const LightVertexCache& cache,
+                                       [[maybe_unused]] uint32_t candidates, [[maybe_unused]] uint32_t u) {
+#if !VLP_ON_DEVICE
+    for (uint32_t i = 0; i < candidates; ++i) {
+        __builtin_prefetch(cache.stored + candidate_index(cache, candidates, i, u));
+    }
+#endif
+}
+
+// The VLP that a connection is made to, and how many of the V it stands for.
+struct VlpChoice {
+    uint32_t slot = 0;
+    float stands_for = 0;
+};
+
+// Of M candidates, from M strata of the list, one in proportion to its promise: `u` draws them and `u_keep` which is kept.
+VLP_HD inline VlpChoice choose_virtual_light_point(const PassSettings& pass, const LightVertexCache& cache,
+                                                   const Receiver& receiver, uint32_t u, float u_keep) {
+    const uint32_t candidates = pass.vlp_candidates;
+    if (candidates == 1) {
+        return {cache.stored[candidate_index(cache, 1, 0, u)].slot, static_cast<float>(cache.stored_count)};
+    }
+    VlpChoice kept;
+    float kept_promise = 0, sum = 0;
+    for (uint32_t first = 0; first < candidates; first += k_candidates_at_once) {
+        const uint32_t count = min_of(candidates - first, k_candidates_at_once);
+        uint32_t index[k_candidates_at_once];
+        float promises[k_candidates_at_once];
+        for (uint32_t i = 0; i < k_candidates_at_once; ++i) {
+            index[i] = candidate_index(cache, candidates, first + min_of(i, count - 1), u);
+        }
+        promise(receiver, cache.stored, index, promises);
+        float here = 0;
+        for (uint32_t i = 0; i < count; ++i) here += promises[i];
+        if (!(here > 0)) continue;
+        sum += here;
+        const float chance = here / sum;
+        if (u_keep >= chance) {
+            u_keep = (u_keep - chance) / (1 - chance);
+            continue;
+        }
+        // The last that begins at or before `at` and has some width.
+        const float at = u_keep * sum;
+        float begin = 0, kept_begin = 0;
+        uint32_t lane = 0;
+        for (uint32_t i = 0; i < count; ++i) {
+            const bool keep = begin <= at && promises[i] > 0;
+            lane = keep ? i : lane;
+            kept_begin = keep ? begin : kept_begin;
+            begin += promises[i];
+        }
+        kept_promise = promises[lane];
+        kept.slot = cache.stored[index[lane]].slot;
+        u_keep = (at - kept_begin) / kept_promise;
+    }
+    if (kept_promise > 0) {
+        kept.stands_for =
+            static_cast<float>(cache.stored_count) * sum / (kept_promise * static_cast<float>(candidates));
+    }
+    return kept;
+}
+
+}  // namespace vlp

@@ -1,0 +1,192 @@
+// Choosing among virtual light points: what a promise is worth, that none is missed, and that it decides how often each is kept.
+#include "integrator/vlp_candidates.h"
+
+#include "integrator/path_tracing.h"
+#include "path_recorder.h"
+#include "random_numbers.h"
+#include "transport_scenes.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+namespace vlp::test {
+namespace {
+
+struct WalkCopies {
+    std::vector<EyeWalk> walks;
+    void add(const Contribution&) {}
+    void visit(const EyeWalk& eye) { walks.push_back(eye); }
+};
+
+PassSettings many_candidates() {
+    PassSettings pass;
+    pass.light_path_length = 8, pass.eye_path_length = 8, pass.light_paths = 200;
+    pass.splats = true;
+    return pass;
+}
+
+// Each connectible eye vertex of a few pixels with each VLP: visit(receiver, promise, connection as if nothing stood between).
+template <typename Visit>
+void for_each_pair(const SceneView& scene, const PassSettings& pass, const Visit& visit) {
+    const TracedLight light(scene, pass, 0);
+    for (uint32_t pixel = 0; pixel < scene.camera.width * scene.camera.height; ++pixel) {
+        WalkCopies copies;
+        trace_eye_path(scene, pass, {}, {0, 0}, pixel % scene.camera.width, pixel / scene.camera.width, copies);
+        for (const EyeWalk& eye : copies.walks) {
+            if (!scene.materials[eye.surface.material].has_finite) continue;
+            const Receiver receiver = make_receiver(scene, pass, eye);
+            const Bsdf bsdf = make_bsdf(scene, eye.surface);
+            for (uint32_t i = 0; i < light.cache.stored_count; i += k_candidates_at_once) {
+                uint32_t index[k_candidates_at_once];
+                float promises[k_candidates_at_once];
+                for (uint32_t k = 0; k < k_candidates_at_once; ++k)
+                    index[k] = min_of(i + k, light.cache.stored_count - 1);
+                promise(receiver, light.cache.stored, index, promises);
+                for (uint32_t k = 0; k < k_candidates_at_once; ++k) {
+                    const VlpChoice choice{light.cache.stored[index[k]].slot, 1};
+                    visit(eye, promises[k], join_unshadowed(scene, pass, light.cache, eye, bsdf, choice).found);
+                }
+            }
+        }
+    }
+}
+
+TEST(VlpCandidates, ALambertianSurfaceKeepsWhatItPromises) {
+    Scene scene;
+    add_materials(scene);
+    add_surface(scene, quad({-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}), k_white);
+    add_surface(scene, quad({-1, 1, 0}, {1, 1, 0}, {1, 1, 2}, {-1, 1, 2}), k_red);
+    add_surface(scene, quad({1, 1, 0}, {1, -1, 0}, {1, -1, 2}, {1, 1, 2}), k_red);
+    every_light()[6].add(scene);
+    scene.set_camera(looking({0, -3.2f, 1.1f}, {0, 0, 0.8f}, 0.45f));
+    scene.set_film(12, 12, {0, 0, 12, 12}, false);
+    scene.build(1);
+    const PassSettings pass = with_kappa(scene.view(), many_candidates());
+    size_t pairs = 0;
+    for_each_pair(scene.view(), pass, [&](const EyeWalk&, float promised, const Contribution& found) {
+        // Next event and splats have other counts than connections, and longer paths have fewer strategies than are promised.
+        if (found.s < 3 || found.t < 3 || found.s + found.t > pass.eye_path_length + 1) return;
+        const Rgb weighted = found.value * found.weight;
+        const float light = (weighted.r + weighted.g + weighted.b) * static_cast<float>(pass.light_paths) * k_pi * k_pi;
+        EXPECT_NEAR(promised, light, 0.02f * light + 1e-6f);
+        ++pairs;
+    });
+    EXPECT_GT(pairs, 1000u);
+}
+
+TEST(VlpCandidates, WhereThereIsLightItIsPromised) {
+    for (const NamedLight& light : every_light()) {
+        const auto scene = crowded_room(light.add, 12);
+        const PassSettings pass = with_kappa(scene->view(), many_candidates());
+        if (!(pass.kappa > 0)) continue;
+        size_t with_light = 0;
+        for_each_pair(scene->view(), pass, [&](const EyeWalk& eye, float promised, const Contribution& found) {
+            EXPECT_TRUE(promised >= 0 && is_finite(promised));
+            const float brought = average(found.value * found.weight);
+            if (!(brought > 1e-9f)) return;
+            ++with_light;
+            EXPECT_GT(promised, 0) << light.name << ", material " << eye.surface.material;
+        });
+        EXPECT_GT(with_light, 1000u) << light.name;
+    }
+}
+
+struct Crowd {
+    std::vector<VlpCandidate> list;
+    LightVertexCache cache;
+    Receiver receiver{{0, 0, 0}, {0, 0, 1}, 1.0f / 64, {1, 0.5f, 0.25f}, 0.3f};
+
+    explicit Crowd(uint32_t count) {
+        Random random{count};
+        for (uint32_t i = 0; i < count; ++i) {
+            const Vec3 at{random.next() - 0.5f, random.next() - 0.5f, random.next() - 0.2f};
+            const Vec3 normal{random.next() - 0.5f, random.next() - 0.5f, random.next() - 0.5f};
+            list.push_back({at, encode(normal), detail::pack_halves(random.next(), random.next()),
+                            detail::pack_halves(random.next(), 1.0f / 64), random.next(), 1000 + i});
+        }
+        cache = {nullptr, list.data(), count};
+    }
+    std::vector<float> promises() const {
+        std::vector<float> all;
+        for (uint32_t i = 0; i < list.size(); ++i) {
+            uint32_t index[k_candidates_at_once];
+            float eight[k_candidates_at_once];
+            std::fill(std::begin(index), std::end(index), i);
+            promise(receiver, list.data(), index, eight);
+            for (const float p : eight) EXPECT_EQ(p, eight[0]);
+            all.push_back(eight[0]);
+        }
+        return all;
+    }
+};
+
+// Written out once more, in double.
+TEST(VlpCandidates, LanesComputeTheFormula) {
+    const Crowd crowd(200);
+    const std::vector<float> promises = crowd.promises();
+    for (uint32_t i = 0; i < crowd.list.size(); ++i) {
+        const VlpCandidate& c = crowd.list[i];
+        const Vec3 n = decode(c.normal);
+        const double squared = double(length_squared(c.position));
+        double at_eye = double(c.position.z) / std::sqrt(squared);
+        double at_vlp = -double(dot(n, c.position)) / std::sqrt(squared);
+        if (at_eye < 0) at_eye *= -1.0 / 64;
+        if (at_vlp < 0) at_vlp *= -1.0 / 64;
+        const double geometry = at_eye * at_vlp / squared;
+        const double light = double(detail::first_half(c.red_and_green)) +
+                             0.5 * double(detail::second_half(c.red_and_green)) +
+                             0.25 * double(detail::first_half(c.blue_and_behind));
+        const double expected = light * geometry / (1 + (0.3 + double(c.others)) * geometry);
+        EXPECT_NEAR(promises[i], expected, 2e-4 * expected + 1e-9);
+    }
+}
+
+// With as many candidates as VLPs, all of them: each is kept as often as its promise says, over evenly spread u_keep.
+TEST(VlpCandidates, EachIsKeptByItsPromise) {
+    for (const uint32_t count : {2u, 7u, 8u, 11u, 16u, 29u}) {
+        const Crowd crowd(count);
+        const std::vector<float> promises = crowd.promises();
+        const double sum = std::accumulate(promises.begin(), promises.end(), 0.0);
+        PassSettings pass;
+        pass.vlp_candidates = count;
+        constexpr uint32_t k_draws = 200000;
+        std::vector<uint32_t> kept(count);
+        for (uint32_t i = 0; i < k_draws; ++i) {
+            const float u = (static_cast<float>(i) + 0.5f) / k_draws;
+            const VlpChoice choice = choose_virtual_light_point(pass, crowd.cache, crowd.receiver, 0x80000000u, u);
+            const uint32_t at = choice.slot - 1000;
+            ASSERT_LT(at, count);
+            ++kept[at];
+            EXPECT_NEAR(choice.stands_for, sum / double(promises[at]), 1e-4 * sum / double(promises[at]));
+        }
+        for (uint32_t i = 0; i < count; ++i) {
+            EXPECT_NEAR(kept[i] / double(k_draws), double(promises[i]) / sum, 2e-4) << i << " of " << count;
+        }
+    }
+}
+
+TEST(VlpCandidates, WhatPromisesNothingIsNotKept) {
+    Crowd crowd(8);
+    crowd.list[1].position = crowd.receiver.position;  // no direction to it
+    crowd.list[2].red_and_green = detail::pack_halves(k_infinity, 1);
+    crowd.list[3].others = std::nanf("");
+    for (const uint32_t black : {0u, 4u, 6u, 7u}) crowd.list[black].others = k_infinity;
+    PassSettings pass;
+    pass.vlp_candidates = 8;
+    const VlpChoice choice = choose_virtual_light_point(pass, crowd.cache, crowd.receiver, 0, 0.7f);
+    EXPECT_EQ(choice.slot, 1005u);
+    EXPECT_EQ(choice.stands_for, 1);
+    crowd.list[5].others = std::nanf("");
+    EXPECT_EQ(choose_virtual_light_point(pass, crowd.cache, crowd.receiver, 0, 0.7f).stands_for, 0);
+}
+
+TEST(VlpCandidates, CandidatesAreOfAllStrata) {
+    const Crowd crowd(1000);
+    for (const uint32_t u : {0u, 0x80000000u, 0xffffffffu}) {
+        for (uint32_t i = 0; i < 8; ++i) EXPECT_EQ(candidate_index(crowd.cache, 8, i, u) / 125, i);
+    }
+}
+
+}  // namespace
+}  // namespace vlp::test
