@@ -70,55 +70,59 @@ struct ChildGroup {
     uint32_t node, mask;
 };
 
+// In the space of an instance, or the world's for k_none. The direction is not normalised, so that t stays in world units.
+VLP_HD inline GridRay grid_ray_in(const SceneView& scene, const Ray& ray, uint32_t instance) {
+    if (instance == k_none) return make_grid_ray(ray.origin, ray.direction);
+    const Affine& to_object = scene.instances[instance].world_to_object;
+    return make_grid_ray(transform_point(to_object, ray.origin), transform_vector(to_object, ray.direction));
+}
+
 // `query` has t_max() and in_leaf(bvh, ray, leaf, instance), which narrows it and tells whether to end there. One loop
 // for the world's tree and those of instances, so that a GPU's threads in both are in step. Returns whether it was ended.
 template <typename Query>
 VLP_HD inline bool search(const SceneView& scene, const Ray& world_ray, Query& query) {
     const BvhView& bvh = scene.bvh;
-    GridRay ray = make_grid_ray(world_ray.origin, world_ray.direction);
+    GridRay ray;
     // A level of a tree leaves a group at most. Those below `bottom` are of the world's tree while in that of `instance`.
     ChildGroup stack[k_group_stack_size];
     uint32_t top = 0, bottom = 0, instance = k_none;
     ChildGroup group{0, 0};
-    uint32_t child = make_child(ChildKind::node, bvh.root);
     const auto take = [&] {
         const uint32_t place = lowest_bit(group.mask) ^ ray.octant;
         group.mask &= group.mask - 1;
         return bvh.compressed[group.node].child[place];
     };
+    uint32_t child = make_child(ChildKind::node, bvh.root);  // k_none: the next of the group
+    bool changes_tree = true;
     for (;;) {
-        bool is_there = true;
-        while (is_there && child_kind(child) == ChildKind::node) {
+        if (changes_tree) ray = grid_ray_in(scene, world_ray, instance);
+        changes_tree = false;
+        if (child == k_none) child = take();
+        while (child != k_none && child_kind(child) == ChildKind::node) {
             count_node();
             if (group.mask != 0) stack[top++] = group;
             const ChildGrid grid = bvh.compressed[child].grid;
             group = {child, meet_grid(ray, grid, query.t_max())};
             if (group.mask == 0 && top > bottom) group = stack[--top];
-            is_there = group.mask != 0;
-            if (is_there) child = take();
+            child = group.mask != 0 ? take() : k_none;
         }
-        if (is_there) {
-            if (child_kind(child) != ChildKind::instance) {
-                if (query.in_leaf(bvh, ray.ray, child, instance)) return true;
-            } else {
-                if (group.mask != 0) stack[top++] = group;
-                group.mask = 0, bottom = top, instance = child_index(child);
-                const Affine& to_object = scene.instances[instance].world_to_object;
-                ray = make_grid_ray(transform_point(to_object, world_ray.origin),
-                                    transform_vector(to_object, world_ray.direction));  // not normalised: t stays
-                child = make_child(ChildKind::node, bvh.instance_roots[instance]);
-                continue;
-            }
+        if (child != k_none && child_kind(child) == ChildKind::instance) {
+            if (group.mask != 0) stack[top++] = group;
+            group.mask = 0, bottom = top, instance = child_index(child);
+            child = make_child(ChildKind::node, bvh.instance_roots[instance]);
+            changes_tree = true;
+            continue;
         }
+        if (child != k_none && query.in_leaf(bvh, ray.ray, child, instance)) return true;
+        child = k_none;
         if (group.mask == 0 && top == bottom && instance != k_none) {
             instance = k_none, bottom = 0;
-            ray = make_grid_ray(world_ray.origin, world_ray.direction);
+            changes_tree = true;
         }
         if (group.mask == 0) {
             if (top == bottom) return false;
             group = stack[--top];
         }
-        child = take();
     }
 }
 

@@ -5,11 +5,13 @@
 
 namespace vlp {
 
-// Steps through nodes and blocks, counted only in the ray benchmark's second build: counting takes time.
-#if VLP_COUNT_VISITS && !VLP_ON_DEVICE
+// Steps through nodes and blocks, counted on the host, and only in benchmarks compiled for it: counting takes time.
+#if VLP_COUNT_VISITS
 inline thread_local uint64_t visited_nodes, visited_blocks;
-VLP_HD inline void count_node() { ++visited_nodes; }
-VLP_HD inline void count_block() { ++visited_blocks; }
+#endif
+#if VLP_COUNT_VISITS && !VLP_ON_DEVICE
+inline void count_node() { ++visited_nodes; }
+inline void count_block() { ++visited_blocks; }
 #else
 VLP_HD inline void count_node() {}
 VLP_HD inline void count_block() {}
@@ -53,6 +55,7 @@ VLP_HD VLP_FORCE_INLINE void closest_in_leaf(const BvhView& bvh, const Traversal
     for (uint32_t b = index; b < end; ++b) {
         count_block();
         const SphereBlock& block = bvh.sphere_blocks[b];
+        VLP_NO_UNROLL
         for (uint32_t i = 0; i < k_block_width; ++i) {
             const uint32_t owner = owner_of(block, i, instance);
             const float t = intersect_lane(ray, block, i, hit.t, is(skip, owner, block.primitive[i]), false);
@@ -79,6 +82,7 @@ VLP_HD VLP_FORCE_INLINE bool any_in_leaf(const BvhView& bvh, const TraversalRay&
     for (uint32_t b = index; b < end; ++b) {
         count_block();
         const SphereBlock& block = bvh.sphere_blocks[b];
+        VLP_NO_UNROLL
         for (uint32_t i = 0; i < k_block_width; ++i) {
             const uint32_t owner = owner_of(block, i, instance);
             const bool from = is(skip_a, owner, block.primitive[i]), to = is(skip_b, owner, block.primitive[i]);
