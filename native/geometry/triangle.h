@@ -37,7 +37,7 @@ VLP_HD inline float along(Vec3 v, uint32_t axis) {
 #endif
 }
 
-VLP_HD inline ShearedRay shear(Vec3 origin, Vec3 direction) {
+VLP_HD VLP_FORCE_INLINE ShearedRay shear(Vec3 origin, Vec3 direction) {
     ShearedRay r{};
     const float ax = std::fabs(direction.x), ay = std::fabs(direction.y), az = std::fabs(direction.z);
     const uint32_t longest = ax > ay ? (ax > az ? 0u : 2u) : (ay > az ? 1u : 2u);

@@ -18,12 +18,14 @@ VLP_HD inline bool has_wide_nodes([[maybe_unused]] const SceneView& scene) {
     return !VLP_ON_DEVICE && scene.bvh.nodes != nullptr;
 }
 VLP_HD VLP_CALLED_ON_DEVICE inline Hit find_closest(const SceneView& scene, const Ray& ray, PrimitiveId skip) {
-    if (has_wide_nodes(scene)) return closest_hit(scene, ray, skip);
+    if (has_wide_nodes(scene)) [[likely]]
+        return closest_hit(scene, ray, skip);
     return closest_hit_compressed(scene, ray, skip);
 }
 VLP_HD VLP_CALLED_ON_DEVICE inline bool find_any(const SceneView& scene, const Ray& ray, PrimitiveId from,
                                                  PrimitiveId to) {
-    if (has_wide_nodes(scene)) return any_hit(scene, ray, from, to);
+    if (has_wide_nodes(scene)) [[likely]]
+        return any_hit(scene, ray, from, to);
     return any_hit_compressed(scene, ray, from, to);
 }
 
