@@ -160,8 +160,8 @@ sanitize: .venv/.ready ## native tests under the address and undefined-behaviour
 cuda-check: .venv/.ready ## compile the CUDA code with the PyPI toolchain alone (no GPU needed), and what its kernels take
 	@rm -rf build/cuda; root=$$(.ci/cuda.sh); \
 	PATH=$(BIN):/usr/bin:/bin env -u CUDA_HOME -u CUDA_PATH -u LIBRARY_PATH bash -euo pipefail -c " \
-	  cmake -S native -B build/cuda -G Ninja -DVLP_PYTHON=OFF -DVLP_CUDA=ON -DVLP_CUDA_ROOT=$$root -DVLP_CUDA_ARCHITECTURES='75-real;90-real' -DVLP_CUDA_REPORT=ON -DVLP_WERROR=ON && \
-	  cmake --build build/cuda --target vlp_cuda -v >build/cuda/build.log 2>&1 || { cat build/cuda/build.log >&2; exit 1; }"
+	  cmake -S native -B build/cuda -G Ninja -DVLP_PYTHON=OFF -DVLP_CUDA=ON -DVLP_CUDA_ROOT=$$root -DVLP_CUDA_ARCHITECTURES='75-real;90-real' -DVLP_CUDA_REPORT=ON -DVLP_WERROR=ON -DVLP_BENCH=ON && \
+	  cmake --build build/cuda --target vlp_cuda vlp_gpu_rays_object -v >build/cuda/build.log 2>&1 || { cat build/cuda/build.log >&2; exit 1; }"
 	$(PY) .ci/kernel-resources.py build/cuda/build.log build/cuda/libvlp_cuda.a "$$(.ci/cuda.sh)/bin/nvdisasm" native/backend/kernels.md $(CUDA_CHECK_ARGS)
 
 .PHONY: gpu-check

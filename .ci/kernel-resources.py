@@ -25,7 +25,10 @@ FILES = 4  # named at most
 Row = tuple[str, ...]
 Table = dict[Row, tuple[Any, ...]]
 
-_KERNEL = re.compile(r"\d(LightPass|CountStored|ListStored|EyePass|GuidedEyePass|Commit|AddMoments|TellVariance)E")
+_KERNEL = re.compile(
+    r"\d(LightPass|CountStored|ListStored|EyePass|GuidedEyePass|Commit|AddMoments|TellVariance"
+    r"|(?:Wide|Compressed)(?:Closest|Any))E"
+)
 _MACHINE_CUDA = 190
 _DOUBLE = re.compile(r"D(ADD|MUL|FMA|SETP|MNMX)\b|MUFU\.\w+64H|[FI]2[FI]\S*F64")
 

@@ -8,6 +8,7 @@
 #include "backend/backend.h"
 #include "backend/device_buffer.h"
 #include "backend/gpu_kernels.h"
+#include "bvh/compressed.h"
 
 namespace vlp {
 
@@ -137,6 +138,7 @@ private:
 
     // Bound how long it takes to stop.
     static constexpr uint32_t k_batch = 1u << 18;
+    static constexpr size_t k_nodes_at_once = 1u << 16;
     // Light paths are halved until they fit, but not below this share of what was asked for.
     static constexpr uint32_t k_least_share = 64;
 
@@ -156,7 +158,7 @@ private:
 
     // Uploads the parts that have changed.
     void place_scene(const Scene& scene) {
-        const ByPart<size_t> bytes = scene.bytes(k_device_alignment);
+        const ByPart<size_t> bytes = scene.bytes(NodeForm::compressed, k_device_alignment);
         ByPart<bool> changed;
         for (size_t i = 0; i < bytes.of.size(); ++i) {
             Part& part = parts_.of[i];
@@ -168,15 +170,30 @@ private:
             part.buffer = buffer<std::byte>(bytes.of[i], std::string("the scene's ") + k_scene_part_names[i]);
         }
         ByPart<size_t> end;
-        scene_ = scene.view_placed([&](ScenePart part, const void* data, size_t size) -> const void* {
+        const auto place = [&](ScenePart part, const void* data, size_t size) -> const void* {
             std::byte* const to = parts_[part].buffer.data() + end[part];
             end[part] += (size + k_device_alignment - 1) / k_device_alignment * k_device_alignment;
-            if (changed[part]) {
+            if (!changed[part]) return to;
+            if (data) {
                 device_.upload(to, data, size);
-                counters.uploaded += size;
+            } else {
+                upload_compressed(to, scene.nodes());
             }
+            counters.uploaded += size;
             return to;
-        });
+        };
+        scene_ = scene.view_placed(place, NodeForm::compressed);
+    }
+
+    // In pieces, as nobody else needs them.
+    void upload_compressed(std::byte* to, std::span<const BvhNode> nodes) {
+        ThreadPool pool;
+        for (; !nodes.empty(); nodes = nodes.subspan(std::min(nodes.size(), k_nodes_at_once))) {
+            const std::vector<CompressedNode> piece =
+                compress(nodes.first(std::min(nodes.size(), k_nodes_at_once)), pool);
+            device_.upload(to, piece.data(), piece.size() * sizeof(CompressedNode));
+            to += piece.size() * sizeof(CompressedNode);
+        }
     }
 
     void place_film(Window window, const PassSettings& pass) {

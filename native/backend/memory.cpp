@@ -20,7 +20,7 @@ MemoryByDevice plan_memory(const std::string& device, const Scene& scene, const 
 
 void add_gpu_memory(MemoryByDevice& memory, const Scene& scene, const PassSettings& pass) {
     MemoryUse& gpu = memory["CUDA"];
-    gpu.scene = scene.bytes(k_device_alignment);
+    gpu.scene = scene.bytes(NodeForm::compressed, k_device_alignment);
     gpu.film += film_bytes(scene.window(), pass) + sample_plan_bytes(scene.window(), pass);
     if (pass.adaptive) {
         gpu.film += scene.window().pixel_count() * sizeof(float);

@@ -21,7 +21,7 @@ WideTree build_tree(std::vector<Ref>& refs, const LeafSource& source, const uint
     presplit(refs, source, pool);
     const LeafRule rule{k_block_width, k_block_cost, kinds};  // the plan makes larger leaves where they pay
     WideTree tree = collapse(build_binary(refs, rule, 64, pool), refs, source, &rule, pool);
-    if (tree.stack_need > k_tree_stack) {  // shapes whose sizes grow exponentially
+    if (tree.stack_need > k_tree_stack || tree.depth > k_max_depth) {  // shapes whose sizes grow exponentially
         tree = collapse(build_binary(refs, rule, 0, pool), refs, source, nullptr, pool);
     }
     return tree;

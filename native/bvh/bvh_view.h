@@ -22,17 +22,19 @@ struct PrimitiveId {
 };
 
 struct BvhNode;
+struct CompressedNode;
 struct TriangleBlock;
 struct SphereBlock;
 
 // One tree: the world's. Its leaves hold triangles and spheres of geometries that are placed once (in world space) and
 // instances of the others, whose own trees stand in the same arrays.
 struct BvhView {
-    const BvhNode* nodes = nullptr;
+    const BvhNode* nodes = nullptr;            // null on a device
     const TriangleBlock* triangle_blocks = nullptr;
     const SphereBlock* sphere_blocks = nullptr;
     const uint32_t* instance_roots = nullptr;  // by instance: root of its geometry's own tree
     uint32_t root = k_none;                    // k_none: an empty scene
+    const CompressedNode* compressed = nullptr;  // in place of `nodes` on a device
 };
 
 }  // namespace vlp

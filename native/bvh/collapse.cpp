@@ -58,15 +58,15 @@ public:
               uint32_t job_size, WideTree& out)
         : tree_(tree), refs_(refs), source_(source), plan_(plan), job_size_(job_size), out_(out) {}
 
-    // Writes the subtree and returns its root and the stack that it needs.
+    // Writes the subtree and returns its root, the stack that it needs and its depth.
     struct Written {
-        uint32_t node, stack_need;
+        uint32_t node, stack_need, depth;
     };
     Written write(const Subtree& subtree) {
         const WideChildren children = plan_ ? plan_->children_of(subtree) : balanced_children(tree_, subtree);
         const auto index = static_cast<uint32_t>(out_.nodes.size());
         out_.nodes.emplace_back();
-        uint32_t deepest = 1;
+        uint32_t stack_need = 1, depth_below = 0;
         for (uint32_t i = 0; i < k_node_width; ++i) {
             const bool there = i < children.count;
             const Subtree& to = children.child[i];
@@ -79,11 +79,12 @@ public:
             } else if (there) {
                 const Written written = write(to);
                 child = make_child(ChildKind::node, written.node);
-                deepest = max_of(deepest, written.stack_need);
+                stack_need = max_of(stack_need, written.stack_need);
+                depth_below = max_of(depth_below, written.depth);
             }
             out_.nodes[index].child[i] = child;
         }
-        return {index, deepest + children.count - 1};
+        return {index, stack_need + children.count - 1, depth_below + 1};
     }
 
     // What `write` would append, of jobs nothing.
@@ -139,7 +140,7 @@ WideTree collapse(const BinaryTree& tree, std::span<const Ref> refs, const LeafS
     const uint32_t job_size = count < 2 * k_min_job ? 0 : max_of(k_min_job, count / 256);
     const auto plan = rule ? std::make_unique<Plan>(tree, refs, *rule, pool) : nullptr;
     Collapser top(tree, refs, source, plan.get(), job_size, whole);
-    const uint32_t top_need = top.write({tree.box, tree.root, 0, count}).stack_need;
+    const auto top_part = top.write({tree.box, tree.root, 0, count});
     const auto job_count = static_cast<uint32_t>(top.jobs.size());
     std::vector<Size> sizes(job_count);
     pool.run(job_count, [&](uint32_t i) {
@@ -148,23 +149,26 @@ WideTree collapse(const BinaryTree& tree, std::span<const Ref> refs, const LeafS
     Size size{whole.nodes.size(), {whole.triangle_blocks.size(), whole.sphere_blocks.size()}};
     for (const Size& part : sizes) size.add(part);
     reserve(whole, size);
-    uint32_t deepest = 0;
+    uint32_t stack_need = 0, depth = 0;
     std::vector<WideTree> parts;
     for (uint32_t begin = 0; begin < job_count; begin += static_cast<uint32_t>(parts.size())) {
         parts = std::vector<WideTree>(min_of(k_batch * pool.size(), job_count - begin));
         pool.run(static_cast<uint32_t>(parts.size()), [&](uint32_t i) {
             reserve(parts[i], sizes[begin + i]);
             Collapser part(tree, refs, source, plan.get(), 0, parts[i]);
-            parts[i].stack_need = part.write(top.jobs[begin + i].subtree).stack_need;
+            const auto written = part.write(top.jobs[begin + i].subtree);
+            parts[i].stack_need = written.stack_need, parts[i].depth = written.depth;
         });
         for (uint32_t i = 0; i < parts.size(); ++i) {
             const Job& job = top.jobs[begin + i];
             const uint32_t root = append(whole, parts[i]);
             whole.nodes[job.parent].child[job.slot] = make_child(ChildKind::node, root);
-            deepest = max_of(deepest, parts[i].stack_need);
+            stack_need = max_of(stack_need, parts[i].stack_need);
+            depth = max_of(depth, parts[i].depth);
         }
     }
-    whole.stack_need = top_need + deepest;
+    whole.stack_need = top_part.stack_need + stack_need;
+    whole.depth = top_part.depth + depth;
     return whole;
 }
 

@@ -11,6 +11,7 @@ struct WideTree {
     std::vector<SphereBlock> sphere_blocks;
     Box box;
     uint32_t stack_need = 0;  // entries of the traversal's stack in the worst case
+    uint32_t depth = 0;       // nodes on the longest way from the root
 };
 
 // Where the refs' primitives are: of the whole scene, or of one geometry (whose refs have no instance).

@@ -58,7 +58,7 @@ VLP_FORCE_INLINE uint32_t intersect_block(const TraversalRay& ray, const Triangl
                                           BlockHits& hits) {
     const ShearedRay& r = ray.sheared;
     const uint32_t kx = r.k[0], ky = r.k[1], kz = r.k[2];
-    const __m128 ox = _mm_set1_ps(r.origin[kx]), oy = _mm_set1_ps(r.origin[ky]), oz = _mm_set1_ps(r.origin[kz]);
+    const __m128 ox = _mm_set1_ps(r.origin[0]), oy = _mm_set1_ps(r.origin[1]), oz = _mm_set1_ps(r.origin[2]);
     const __m128 sx = _mm_set1_ps(r.shear_x), sy = _mm_set1_ps(r.shear_y);
     const auto& p = block.vertex;
     const __m128 az = _mm_sub_ps(_mm_load_ps(p[0][kz]), oz);
@@ -120,24 +120,6 @@ VLP_HD inline uint32_t meet_children(const TraversalRay& ray, const BvhNode& nod
     return mask;
 }
 
-struct BlockHits {
-    float t[k_block_width], u[k_block_width], v[k_block_width];
-};
-
-VLP_HD inline uint32_t intersect_block(const TraversalRay& ray, const TriangleBlock& block, float t_max,
-                                       BlockHits& hits) {
-    uint32_t mask = 0;
-    for (uint32_t i = 0; i < k_block_width; ++i) {
-        const auto& p = block.vertex;
-        const float a[3] = {p[0][0][i], p[0][1][i], p[0][2][i]}, b[3] = {p[1][0][i], p[1][1][i], p[1][2][i]},
-                    c[3] = {p[2][0][i], p[2][1][i], p[2][2][i]};
-        const TriangleHit hit = intersect(ray.sheared, a, b, c, t_max);
-        hits.t[i] = hit.t, hits.u[i] = hit.u, hits.v[i] = hit.v;
-        mask |= (hit.found ? 1u : 0u) << i;
-    }
-    return mask;
-}
-
 #endif
 
 VLP_HD inline uint32_t lowest_bit(uint32_t mask) {
@@ -146,6 +128,31 @@ VLP_HD inline uint32_t lowest_bit(uint32_t mask) {
 #else
     return static_cast<uint32_t>(__builtin_ctz(mask));
 #endif
+}
+
+// Calls visit(i, t, u, v) for every triangle i of the block that is hit in (0, t_max), and returns true as soon as it does.
+template <typename Visit>
+VLP_HD VLP_FORCE_INLINE bool visit_hits(const TraversalRay& ray, const TriangleBlock& block, float t_max,
+                                        const Visit& visit) {
+#if VLP_AVX2
+    BlockHits hits;
+    for (uint32_t mask = intersect_block(ray, block, t_max, hits); mask != 0; mask &= mask - 1) {
+        const uint32_t i = lowest_bit(mask);
+        if (visit(i, hits.t[i], hits.u[i], hits.v[i])) return true;
+    }
+#else
+    // Absent triangles come last.
+    VLP_NO_UNROLL
+    for (uint32_t i = 0; i < k_block_width && block.primitive[i] != k_none; ++i) {
+        const auto corner = [&](uint32_t v) {
+            const auto& [x, y, z] = ray.sheared.k;
+            return Vec3{block.vertex[v][x][i], block.vertex[v][y][i], block.vertex[v][z][i]};
+        };
+        const TriangleHit hit = intersect(ray.sheared, corner(0), corner(1), corner(2), t_max);
+        if (hit.found && visit(i, hit.t, hit.u, hit.v)) return true;
+    }
+#endif
+    return false;
 }
 
 }  // namespace vlp

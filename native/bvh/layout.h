@@ -50,4 +50,9 @@ struct alignas(16) SphereBlock {
 // Entries that a traversal may need, in the world's tree and one instance's together; the builder keeps to it.
 inline constexpr uint32_t k_stack_size = 256;
 
+// Nodes on the longest way through a tree, which the builder keeps to as well, and the groups of children that wait on the
+// stack of a search through compressed nodes: one a level at most, of the world's tree and one instance's.
+inline constexpr uint32_t k_max_depth = 32;
+inline constexpr uint32_t k_group_stack_size = 2 * k_max_depth;
+
 }  // namespace vlp

@@ -17,7 +17,7 @@ struct TraversalRay {
     ShearedRay sheared;
 };
 
-VLP_HD inline TraversalRay make_traversal_ray(Vec3 origin, Vec3 direction) {
+VLP_HD VLP_FORCE_INLINE TraversalRay make_traversal_ray(Vec3 origin, Vec3 direction) {
     constexpr float k_offset_error = 0x1p-21f;
     constexpr float k_max_offset = 0x1p126f;  // keeps times numbers
     TraversalRay r;

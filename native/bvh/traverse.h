@@ -1,38 +1,17 @@
 // What a ray hits first, and whether it hits anything: the two loops through the tree.
 #pragma once
 
-#include "bvh/lanes.h"
+#include "bvh/leaves.h"
 #include "scene/scene_view.h"
 
 namespace vlp {
 
-// Steps through nodes and blocks, counted only in the ray benchmark's second build: counting takes time.
-#if VLP_COUNT_VISITS
-inline thread_local uint64_t visited_nodes, visited_blocks;
-VLP_HD inline void count_node() { ++visited_nodes; }
-VLP_HD inline void count_block() { ++visited_blocks; }
-#else
-VLP_HD inline void count_node() {}
-VLP_HD inline void count_block() {}
-#endif
-
 namespace detail {
-
-VLP_HD inline bool is(PrimitiveId id, uint32_t instance, uint32_t primitive) {
-    return id.primitive == primitive && id.instance == instance;
-}
 
 // The ray in the space of an instance. The direction is not normalised, so that t stays in world units.
 VLP_HD inline TraversalRay enter(const InstanceView& instance, const Ray& ray) {
     return make_traversal_ray(transform_point(instance.world_to_object, ray.origin),
                               transform_vector(instance.world_to_object, ray.direction));
-}
-
-VLP_HD inline float intersect_lane(const TraversalRay& ray, const SphereBlock& block, uint32_t i, float t_max,
-                                   bool from, bool to) {
-    const Vec3 center{block.center[0][i], block.center[1][i], block.center[2][i]};
-    const SphereRoots roots = intersect_sphere(ray.origin, ray.direction, center, block.radius[i]);
-    return roots.found ? first_root(roots, t_max, from, to) : k_infinity;
 }
 
 // Asks for the memory of a child that will soon be visited, while others are still in work.
@@ -106,31 +85,10 @@ VLP_HD inline void closest_in_tree(const SceneView& scene, const Ray& world_ray,
                                              : push_sorted(bvh, node, mask, entry, stack, top);
         }
         if (at_leaf) {
-            const uint32_t index = child_index(child), end = index + child_blocks(child);
-            if (child_kind(child) == ChildKind::triangles) {
-                for (uint32_t b = index; b < end; ++b) {
-                    count_block();
-                    const TriangleBlock& block = bvh.triangle_blocks[b];
-                    BlockHits hits;
-                    for (uint32_t mask = intersect_block(ray, block, hit.t, hits); mask != 0; mask &= mask - 1) {
-                        const uint32_t i = lowest_bit(mask);
-                        const uint32_t owner = in_world ? block.instance[i] : instance;
-                        if (hits.t[i] >= hit.t || is(skip, owner, block.primitive[i])) continue;
-                        hit = {hits.t[i], hits.u[i], hits.v[i], block.primitive[i], owner};
-                    }
-                }
-            } else if (child_kind(child) == ChildKind::spheres) {
-                for (uint32_t b = index; b < end; ++b) {
-                    count_block();
-                    const SphereBlock& block = bvh.sphere_blocks[b];
-                    for (uint32_t i = 0; i < k_block_width; ++i) {
-                        const uint32_t owner = in_world ? block.instance[i] : instance;
-                        const bool from = is(skip, owner, block.primitive[i]);
-                        const float t = intersect_lane(ray, block, i, hit.t, from, false);
-                        if (t < hit.t) hit = {t, 0, 0, block.primitive[i], owner};
-                    }
-                }
+            if (child_kind(child) != ChildKind::instance) {
+                closest_in_leaf(bvh, ray, child, in_world ? k_none : instance, skip, hit);
             } else if constexpr (in_world) {
+                const uint32_t index = child_index(child);
                 const TraversalRay local = enter(scene.instances[index], world_ray);
                 closest_in_tree<false>(scene, world_ray, local, bvh.instance_roots[index], index, skip, stack + top,
                                        hit);
@@ -170,32 +128,11 @@ VLP_HD inline bool any_in_tree(const SceneView& scene, const Ray& world_ray, con
             }
         }
         if (at_leaf) {
-            const uint32_t index = child_index(child), end = index + child_blocks(child);
-            if (child_kind(child) == ChildKind::triangles) {
-                for (uint32_t b = index; b < end; ++b) {
-                    count_block();
-                    const TriangleBlock& block = bvh.triangle_blocks[b];
-                    BlockHits hits;
-                    for (uint32_t mask = intersect_block(ray, block, world_ray.t_max, hits); mask != 0;
-                         mask &= mask - 1) {
-                        const uint32_t i = lowest_bit(mask);
-                        const uint32_t owner = in_world ? block.instance[i] : instance;
-                        if (!is(skip_a, owner, block.primitive[i]) && !is(skip_b, owner, block.primitive[i]))
-                            return true;
-                    }
-                }
-            } else if (child_kind(child) == ChildKind::spheres) {
-                for (uint32_t b = index; b < end; ++b) {
-                    count_block();
-                    const SphereBlock& block = bvh.sphere_blocks[b];
-                    for (uint32_t i = 0; i < k_block_width; ++i) {
-                        const uint32_t owner = in_world ? block.instance[i] : instance;
-                        const bool from = is(skip_a, owner, block.primitive[i]);
-                        const bool to = is(skip_b, owner, block.primitive[i]);
-                        if (intersect_lane(ray, block, i, world_ray.t_max, from, to) < world_ray.t_max) return true;
-                    }
-                }
+            if (child_kind(child) != ChildKind::instance) {
+                const uint32_t owner = in_world ? k_none : instance;
+                if (any_in_leaf(bvh, ray, world_ray.t_max, child, owner, skip_a, skip_b)) return true;
             } else if constexpr (in_world) {
+                const uint32_t index = child_index(child);
                 const TraversalRay local = enter(scene.instances[index], world_ray);
                 if (any_in_tree<false>(scene, world_ray, local, bvh.instance_roots[index], index, skip_a, skip_b,
                                        stack + top)) {

@@ -51,9 +51,10 @@ enable_language(CUDA)
 # Compiled once for all instruction sets: what crosses this border must not depend on one.
 file(GLOB cuda_sources CONFIGURE_DEPENDS backend/*.cu)
 add_library(vlp_cuda STATIC ${cuda_sources})
-target_compile_options(vlp_cuda PRIVATE --expt-relaxed-constexpr --extended-lambda -lineinfo --threads=0
+set(VLP_CUDA_OPTIONS --expt-relaxed-constexpr --extended-lambda -lineinfo --threads=0
   -Xcompiler=-fno-math-errno,-Wall $<$<BOOL:${VLP_WERROR}>:-Werror=all-warnings>
   $<$<BOOL:${VLP_CUDA_REPORT}>:-Xptxas=-v$<SEMICOLON>--no-compress>)
+target_compile_options(vlp_cuda PRIVATE ${VLP_CUDA_OPTIONS})
 target_link_libraries(vlp_cuda PUBLIC vlp_options)
 vlp_link_cuda_runtime(${CMAKE_CUDA_COMPILER_TOOLKIT_ROOT})
 set(VLP_HAS_CUDA TRUE)

@@ -26,3 +26,10 @@
 #else
 #define VLP_CALLED_ON_DEVICE
 #endif
+
+// Before a loop: a device keeps one copy of its body, where many would fill the instruction caches.
+#if VLP_ON_DEVICE
+#define VLP_NO_UNROLL _Pragma("unroll 1")
+#else
+#define VLP_NO_UNROLL
+#endif

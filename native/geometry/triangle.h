@@ -23,22 +23,31 @@ VLP_HD VLP_FORCE_INLINE float rounded_product(float a, float b) {
 
 // A ray in the space where it runs along +z: axis `k[2]` is its longest, the others are sheared.
 struct ShearedRay {
-    float origin[3];
+    float origin[3];  // along the axes k
     uint32_t k[3];
     float shear_x, shear_y, scale_z;
 };
 
-VLP_HD inline ShearedRay shear(Vec3 origin, Vec3 direction) {
-    const float d[3] = {direction.x, direction.y, direction.z};
-    ShearedRay r{{origin.x, origin.y, origin.z}, {}, 0, 0, 0};
-    const float ax = std::fabs(d[0]), ay = std::fabs(d[1]), az = std::fabs(d[2]);
+// A device would put what it indexes into memory, a processor's selections may be branches.
+VLP_HD inline float along(Vec3 v, uint32_t axis) {
+#if VLP_ON_DEVICE
+    return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
+#else
+    return (&v.x)[axis];
+#endif
+}
+
+VLP_HD VLP_FORCE_INLINE ShearedRay shear(Vec3 origin, Vec3 direction) {
+    ShearedRay r{};
+    const float ax = std::fabs(direction.x), ay = std::fabs(direction.y), az = std::fabs(direction.z);
     const uint32_t longest = ax > ay ? (ax > az ? 0u : 2u) : (ay > az ? 1u : 2u);
     r.k[2] = longest;
     r.k[0] = longest == 2 ? 0 : longest + 1;
     r.k[1] = r.k[0] == 2 ? 0 : r.k[0] + 1;
-    r.scale_z = 1.0f / d[longest];
-    r.shear_x = d[r.k[0]] * r.scale_z;
-    r.shear_y = d[r.k[1]] * r.scale_z;
+    for (uint32_t i = 0; i < 3; ++i) r.origin[i] = along(origin, r.k[i]);
+    r.scale_z = 1.0f / along(direction, longest);
+    r.shear_x = along(direction, r.k[0]) * r.scale_z;
+    r.shear_y = along(direction, r.k[1]) * r.scale_z;
     return r;
 }
 
@@ -72,17 +81,15 @@ VLP_HD inline TriangleHit intersect_exactly(float ax, float ay, float az, float 
     return detail::solve<double>(u, v, w, az, bz, cz, scale_z, t_max);
 }
 
-// Vertices as arrays [x, y, z]; finds t in (0, t_max). Both sides are hit.
-VLP_HD inline TriangleHit intersect(const ShearedRay& ray, const float (&a)[3], const float (&b)[3],
-                                    const float (&c)[3], float t_max) {
-    const uint32_t x = ray.k[0], y = ray.k[1], z = ray.k[2];
-    const float az = a[z] - ray.origin[z], bz = b[z] - ray.origin[z], cz = c[z] - ray.origin[z];
-    const float ax = (a[x] - ray.origin[x]) - rounded_product(ray.shear_x, az);
-    const float ay = (a[y] - ray.origin[y]) - rounded_product(ray.shear_y, az);
-    const float bx = (b[x] - ray.origin[x]) - rounded_product(ray.shear_x, bz);
-    const float by = (b[y] - ray.origin[y]) - rounded_product(ray.shear_y, bz);
-    const float cx = (c[x] - ray.origin[x]) - rounded_product(ray.shear_x, cz);
-    const float cy = (c[y] - ray.origin[y]) - rounded_product(ray.shear_y, cz);
+// Vertices along the ray's axes k; finds t in (0, t_max). Both sides are hit.
+VLP_HD inline TriangleHit intersect(const ShearedRay& ray, Vec3 a, Vec3 b, Vec3 c, float t_max) {
+    const float az = a.z - ray.origin[2], bz = b.z - ray.origin[2], cz = c.z - ray.origin[2];
+    const float ax = (a.x - ray.origin[0]) - rounded_product(ray.shear_x, az);
+    const float ay = (a.y - ray.origin[1]) - rounded_product(ray.shear_y, az);
+    const float bx = (b.x - ray.origin[0]) - rounded_product(ray.shear_x, bz);
+    const float by = (b.y - ray.origin[1]) - rounded_product(ray.shear_y, bz);
+    const float cx = (c.x - ray.origin[0]) - rounded_product(ray.shear_x, cz);
+    const float cy = (c.y - ray.origin[1]) - rounded_product(ray.shear_y, cz);
     const float u = rounded_product(cx, by) - rounded_product(cy, bx);
     const float v = rounded_product(ax, cy) - rounded_product(ay, cx);
     const float w = rounded_product(bx, ay) - rounded_product(by, ax);

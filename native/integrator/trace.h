@@ -1,6 +1,7 @@
 // Edges of paths: walking to the next surface and seeing whether two points are joined, both through transparent ones.
 #pragma once
 
+#include "bvh/compressed_traverse.h"
 #include "bvh/traverse.h"
 #include "core/sampler.h"
 #include "geometry/surface.h"
@@ -11,13 +12,21 @@ namespace vlp {
 // Most transparent surfaces that one edge may cross; what lies behind more of them is dark.
 inline constexpr int k_max_transparent = 128;
 
-// The searches of the tree, of which every place that sends a ray shares one stack on a device.
+// The searches of the tree, of which every place that sends a ray shares one stack on a device. Devices have compressed
+// nodes alone, and so does a host that stands in for one.
+VLP_HD inline bool has_wide_nodes([[maybe_unused]] const SceneView& scene) {
+    return !VLP_ON_DEVICE && scene.bvh.nodes != nullptr;
+}
 VLP_HD VLP_CALLED_ON_DEVICE inline Hit find_closest(const SceneView& scene, const Ray& ray, PrimitiveId skip) {
-    return closest_hit(scene, ray, skip);
+    if (has_wide_nodes(scene)) [[likely]]
+        return closest_hit(scene, ray, skip);
+    return closest_hit_compressed(scene, ray, skip);
 }
 VLP_HD VLP_CALLED_ON_DEVICE inline bool find_any(const SceneView& scene, const Ray& ray, PrimitiveId from,
                                                  PrimitiveId to) {
-    return any_hit(scene, ray, from, to);
+    if (has_wide_nodes(scene)) [[likely]]
+        return any_hit(scene, ray, from, to);
+    return any_hit_compressed(scene, ray, from, to);
 }
 
 // The start of a ray or one end of a connection: a point of a surface, or free in space (id none, normal zero).

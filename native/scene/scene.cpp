@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "bsdf/albedo_tables.h"
+#include "bvh/compressed.h"
 #include "film/filter_tables.h"
 #include "light/light.h"
 #include "scene/input_checks.h"
@@ -129,7 +130,7 @@ void Scene::build(unsigned threads) {
     open_ = {};
     moved_ = {std::vector<uint8_t>(geometries_.size()), std::vector<uint8_t>(instances_.size())};
 
-    view_ = view_placed(in_place);
+    view_ = view_placed(in_place, NodeForm::wide);
     view_.geometries = geometry_views_.data();  // the passes' own copy, which lives as long as the scene
     info_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     built_ = true;
@@ -175,7 +176,7 @@ void Scene::check_material_indices() const {
     }
 }
 
-SceneView Scene::view_placed(const Place& place) const {
+SceneView Scene::view_placed(const Place& place, NodeForm form) const {
     using enum ScenePart;
     SceneView v;
     std::vector<GeometryView> views;
@@ -198,8 +199,14 @@ SceneView Scene::view_placed(const Place& place) const {
     v.environment.columns_below = placed(world_tables_.columns_below, world, place);
     v.albedo_tables = placed(albedo_tables(), tables, place);
     v.filter_tables = placed(filter_tables(), tables, place);
-    v.bvh = {placed(bvh_.nodes, bvh, place), placed(bvh_.triangle_blocks, bvh, place),
-             placed(bvh_.sphere_blocks, bvh, place), placed(bvh_.instance_roots, bvh, place), bvh_.root};
+    v.bvh = {nullptr, placed(bvh_.triangle_blocks, bvh, place), placed(bvh_.sphere_blocks, bvh, place),
+             placed(bvh_.instance_roots, bvh, place), bvh_.root};
+    if (form == NodeForm::wide) {
+        v.bvh.nodes = placed(bvh_.nodes, bvh, place);
+    } else if (!bvh_.nodes.empty()) {
+        const size_t size = bvh_.nodes.size() * sizeof(CompressedNode);
+        v.bvh.compressed = static_cast<const CompressedNode*>(place(bvh, nullptr, size));
+    }
     v.geometry_count = static_cast<uint32_t>(geometries_.size());
     v.instance_count = static_cast<uint32_t>(instances_.size());
     v.light_count = static_cast<uint32_t>(lights_.size());
@@ -211,12 +218,13 @@ SceneView Scene::view_placed(const Place& place) const {
     return v;
 }
 
-ByPart<size_t> Scene::bytes(size_t alignment) const {
+ByPart<size_t> Scene::bytes(NodeForm form, size_t alignment) const {
     ByPart<size_t> bytes;
-    view_placed([&](ScenePart part, const void* data, size_t size) {
+    const auto count = [&](ScenePart part, const void* data, size_t size) {
         bytes[part] += (size + alignment - 1) / alignment * alignment;
         return data;
-    });
+    };
+    view_placed(count, form);
     return bytes;
 }
 

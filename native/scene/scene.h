@@ -56,9 +56,11 @@ public:
     void move_instance(uint32_t instance, const Affine& object_to_world);
 
     const SceneView& view() const { return view_; }
-    // The same with every array where `place(part, data, bytes)` says that a copy of it stands: how a GPU gets the scene.
+    // The same with every array where `place(part, data, bytes)` says that a copy of it stands: how a GPU gets the scene. For
+    // compressed nodes, which are not kept, `data` is null: they are what compress() makes of nodes().
     using Place = vlp::Place;
-    SceneView view_placed(const Place& place) const;
+    SceneView view_placed(const Place& place, NodeForm form) const;
+    std::span<const BvhNode> nodes() const { return bvh_.nodes; }
     // Changes with what is in the part, and is another for each scene.
     uint64_t revision(ScenePart part) const { return revisions_[part]; }
     const Window& window() const { return window_; }
@@ -66,7 +68,7 @@ public:
     bool built() const { return built_; }
 
     // What the arrays of each part take where each begins at a multiple of `alignment`.
-    ByPart<size_t> bytes(size_t alignment = 1) const;
+    ByPart<size_t> bytes(NodeForm form = NodeForm::wide, size_t alignment = 1) const;
 
     struct Info {
         uint64_t triangles = 0, spheres = 0, instances = 0, lamps = 0, emitters = 0;

@@ -14,6 +14,9 @@ enum class ScenePart : uint8_t { geometry, bvh, instances, materials, lights, wo
 inline constexpr std::array<const char*, 7> k_scene_part_names{"geometry", "bvh",   "instances", "materials",
                                                                "lights",   "world", "tables"};
 
+// In which form a device has the nodes of the tree: see BvhNode and CompressedNode.
+enum class NodeForm : uint8_t { wide, compressed };
+
 // A number for each part of a scene.
 template <typename T>
 struct ByPart {

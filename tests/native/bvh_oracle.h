@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "tests/native/ray_scenes.h"
+#include "tests/native/both_forms.h"
 
 namespace vlp::test {
 

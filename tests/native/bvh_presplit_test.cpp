@@ -109,7 +109,7 @@ TEST(BvhPresplit, HitsAreThoseWithoutATree) {
     scene.place(scene.add(mesh));
     scene.build();
     ASSERT_GT(scene.bvh.triangle_blocks.size() * k_block_width, 2 * mesh.triangles.size()) << "parts of triangles";
-    const SceneView view = scene.view();
+    const BothForms view(scene);
     std::mt19937 random(7);
     std::uniform_real_distribution<float> uniform(-1, 1);
     int found = 0;

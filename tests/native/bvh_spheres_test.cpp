@@ -1,6 +1,8 @@
 // Spheres in the tree: precision, both sides, skipping one of the two roots, instances.
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "geometry/surface.h"
 #include "tests/native/bvh_oracle.h"
 
@@ -25,7 +27,7 @@ TEST(BvhSpheres, AgreeWithDoublePrecision) {
             scene.place(scene.add(many), random_affine(random, 0.5f, 1));  // once, but no spheres in world space
         }
         scene.build();
-        const SceneView view = scene.view();
+        const BothForms view(scene);
         int found = 0;
         for (int i = 0; i < 2000; ++i) {
             const Ray ray{random_point(random, 2), random_direction(random)};
@@ -65,7 +67,7 @@ TEST(BvhSpheres, TinyHugeAndFar) {
             scene.place(scene.add(std::vector<Sphere>{{center, c.radius}}));
             scene.build();
             const Ray ray{{0, 0, 0}, direction};
-            const Hit hit = closest_hit(scene.view(), ray, {});
+            const Hit hit = closest_hit(BothForms(scene), ray, {});
             ASSERT_TRUE(hit.found()) << c.radius;
             const double exact = exact_closest(scene, ray).t;
             EXPECT_NEAR(hit.t, exact, 4e-7 * (static_cast<double>(c.distance) + c.radius)) << c.radius;
@@ -83,17 +85,17 @@ protected:
     OneSphere() {
         scene_.place(scene_.add(std::vector<Sphere>{{{1, 2, 3}, 2}}));
         scene_.build();
-        view_ = scene_.view();
+        view_.emplace(scene_);
     }
     RayScene scene_;
-    SceneView view_;
+    std::optional<BothForms> view_;
 };
 
 TEST_F(OneSphere, FromInsideTheFarSideIsHit) {
-    const Hit hit = closest_hit(view_, {{1, 2, 3}, {0, 1, 0}}, {});
+    const Hit hit = closest_hit(*view_, {{1, 2, 3}, {0, 1, 0}}, {});
     ASSERT_TRUE(hit.found());
     EXPECT_FLOAT_EQ(hit.t, 2);
-    const SurfacePoint point = surface_at(view_, {{1, 2, 3}, {0, 1, 0}}, hit);
+    const SurfacePoint point = surface_at(view_->wide, {{1, 2, 3}, {0, 1, 0}}, hit);
     EXPECT_FLOAT_EQ(point.geometric_normal.y, 1) << "the outside, not the ray's side";
 }
 
@@ -106,9 +108,9 @@ TEST_F(OneSphere, RaysThatLeaveIt) {
         if (std::fabs(cosine) < 1e-4f) continue;
         Vec3 p = Vec3{1, 2, 3} + n * 2.0f;
         if (i % 2) p = offset_origin(p, face_toward(n, d));
-        const Hit hit = closest_hit(view_, {p, d}, {0, 0});
+        const Hit hit = closest_hit(*view_, {p, d}, {0, 0});
         ASSERT_EQ(hit.found(), cosine < 0) << cosine;
-        ASSERT_EQ(any_hit(view_, {p, d}, {0, 0}, {}), cosine < 0) << cosine;
+        ASSERT_EQ(any_hit(*view_, {p, d}, {0, 0}, {}), cosine < 0) << cosine;
         if (hit.found()) {
             // Moving the origin by 256 ulps along the normal moves the far side by that over the cosine.
             ASSERT_NEAR(hit.t, -4 * cosine, 4e-4f / std::fabs(cosine)) << cosine;
@@ -119,22 +121,22 @@ TEST_F(OneSphere, RaysThatLeaveIt) {
 TEST_F(OneSphere, RaysThatGoToIt) {
     const PrimitiveId id{0, 0};
     // To the front: only the end itself is met.
-    EXPECT_FALSE(any_hit(view_, {{-4, 2, 3}, {1, 0, 0}, 3.0001f}, {}, id));
-    EXPECT_FALSE(any_hit(view_, {{-4, 2, 3}, {1, 0, 0}, 2.9999f}, {}, id));
-    EXPECT_TRUE(any_hit(view_, {{-4, 2, 3}, {1, 0, 0}, 3.0001f}, {}, {}));
+    EXPECT_FALSE(any_hit(*view_, {{-4, 2, 3}, {1, 0, 0}, 3.0001f}, {}, id));
+    EXPECT_FALSE(any_hit(*view_, {{-4, 2, 3}, {1, 0, 0}, 2.9999f}, {}, id));
+    EXPECT_TRUE(any_hit(*view_, {{-4, 2, 3}, {1, 0, 0}, 3.0001f}, {}, {}));
     // To the back: the ball is in its own way.
-    EXPECT_TRUE(any_hit(view_, {{-4, 2, 3}, {1, 0, 0}, 7.0001f}, {}, id));
-    EXPECT_TRUE(any_hit(view_, {{-4, 2, 3}, {1, 0, 0}, 6.9999f}, {}, id));
+    EXPECT_TRUE(any_hit(*view_, {{-4, 2, 3}, {1, 0, 0}, 7.0001f}, {}, id));
+    EXPECT_TRUE(any_hit(*view_, {{-4, 2, 3}, {1, 0, 0}, 6.9999f}, {}, id));
     // From its inner side to its inner side.
-    EXPECT_FALSE(any_hit(view_, {{-1, 2, 3}, {1, 0, 0}, 4.0001f}, id, id));
-    EXPECT_FALSE(any_hit(view_, {{-1, 2, 3}, {1, 0, 0}, 3.9999f}, id, id));
+    EXPECT_FALSE(any_hit(*view_, {{-1, 2, 3}, {1, 0, 0}, 4.0001f}, id, id));
+    EXPECT_FALSE(any_hit(*view_, {{-1, 2, 3}, {1, 0, 0}, 3.9999f}, id, id));
 }
 
 TEST(BvhSpheres, OtherSpheresStillBlock) {
     RayScene scene;
     scene.place(scene.add(std::vector<Sphere>{{{0, 0, 0}, 1}, {{5, 0, 0}, 1}, {{10, 0, 0}, 1}}));
     scene.build();
-    const SceneView view = scene.view();
+    const BothForms view(scene);
     EXPECT_TRUE(any_hit(view, {{1, 0, 0}, {1, 0, 0}, 8}, {0, 0}, {0, 2}));
     EXPECT_FALSE(any_hit(view, {{1, 0, 0}, {1, 0, 0}, 3}, {0, 0}, {0, 1}));
     EXPECT_EQ(closest_hit(view, {{1, 0, 0}, {1, 0, 0}}, {0, 0}).primitive, 1u);

@@ -32,7 +32,7 @@ Ray random_ray(std::mt19937& random, float size) {
 // a primitive's size within which its border, or two primitives' order, may be mistaken.
 void expect_agreement(const RayScene& scene, float size, int rays, uint32_t seed, double slack = 2e-5) {
     std::mt19937 random(seed);
-    const SceneView view = scene.view();
+    const BothForms view(scene);
     int found = 0;
     for (int i = 0; i < rays; ++i) {
         const Ray ray = random_ray(random, size);
@@ -80,13 +80,13 @@ Mesh soup(std::mt19937& random, int count, float size, float edge) {
 TEST(Bvh, EmptyScenes) {
     RayScene scene;
     scene.build();
-    EXPECT_FALSE(closest_hit(scene.view(), {{0, 0, 0}, {0, 0, 1}}, {}).found());
-    EXPECT_FALSE(any_hit(scene.view(), {{0, 0, 0}, {0, 0, 1}}, {}, {}));
+    EXPECT_FALSE(closest_hit(BothForms(scene), {{0, 0, 0}, {0, 0, 1}}, {}).found());
+    EXPECT_FALSE(any_hit(BothForms(scene), {{0, 0, 0}, {0, 0, 1}}, {}, {}));
     scene.place(scene.add(Mesh{}));
     const uint32_t twice = scene.add(Mesh{});
     scene.place(twice), scene.place(twice);
     scene.build();
-    EXPECT_FALSE(closest_hit(scene.view(), {{0, 0, 0}, {0, 0, 1}}, {}).found());
+    EXPECT_FALSE(closest_hit(BothForms(scene), {{0, 0, 0}, {0, 0, 1}}, {}).found());
     EXPECT_EQ(scene.bvh.bytes(), scene.instances.size() * sizeof(uint32_t));
 }
 
@@ -96,21 +96,21 @@ TEST(Bvh, OneTriangle) {
     mesh.add({0, 0, 2}, {4, 0, 2}, {0, 4, 2});
     scene.place(scene.add(mesh));
     scene.build();
-    const Hit hit = closest_hit(scene.view(), {{1, 2, 0}, {0, 0, 1}}, {});
+    const Hit hit = closest_hit(BothForms(scene), {{1, 2, 0}, {0, 0, 1}}, {});
     ASSERT_TRUE(hit.found());
     EXPECT_FLOAT_EQ(hit.t, 2);
     EXPECT_FLOAT_EQ(hit.u, 0.25f);
     EXPECT_FLOAT_EQ(hit.v, 0.5f);
     EXPECT_EQ(hit.primitive, 0u);
     EXPECT_EQ(hit.instance, 0u);
-    EXPECT_TRUE(closest_hit(scene.view(), {{1, 2, 4}, {0, 0, -1}}, {}).found()) << "from behind";
-    EXPECT_FALSE(closest_hit(scene.view(), {{1, 2, 0}, {0, 0, -1}}, {}).found()) << "away";
-    EXPECT_FALSE(closest_hit(scene.view(), {{1, 2, 0}, {0, 0, 1}, 2}, {}).found()) << "t_max is not reached";
-    EXPECT_FALSE(closest_hit(scene.view(), {{1, 2, 2}, {0, 0, 1}}, {}).found()) << "t = 0 is no hit";
-    EXPECT_FALSE(closest_hit(scene.view(), {{1, 2, 0}, {0, 0, 1}}, {0, 0}).found()) << "skipped";
-    EXPECT_FALSE(any_hit(scene.view(), {{1, 2, 0}, {0, 0, 1}}, {0, 0}, {})) << "skipped";
-    EXPECT_FALSE(any_hit(scene.view(), {{1, 2, 0}, {0, 0, 1}}, {}, {0, 0})) << "skipped";
-    EXPECT_TRUE(any_hit(scene.view(), {{1, 2, 0}, {0, 0, 1}}, {0, 1}, {1, 0}));
+    EXPECT_TRUE(closest_hit(BothForms(scene), {{1, 2, 4}, {0, 0, -1}}, {}).found()) << "from behind";
+    EXPECT_FALSE(closest_hit(BothForms(scene), {{1, 2, 0}, {0, 0, -1}}, {}).found()) << "away";
+    EXPECT_FALSE(closest_hit(BothForms(scene), {{1, 2, 0}, {0, 0, 1}, 2}, {}).found()) << "t_max is not reached";
+    EXPECT_FALSE(closest_hit(BothForms(scene), {{1, 2, 2}, {0, 0, 1}}, {}).found()) << "t = 0 is no hit";
+    EXPECT_FALSE(closest_hit(BothForms(scene), {{1, 2, 0}, {0, 0, 1}}, {0, 0}).found()) << "skipped";
+    EXPECT_FALSE(any_hit(BothForms(scene), {{1, 2, 0}, {0, 0, 1}}, {0, 0}, {})) << "skipped";
+    EXPECT_FALSE(any_hit(BothForms(scene), {{1, 2, 0}, {0, 0, 1}}, {}, {0, 0})) << "skipped";
+    EXPECT_TRUE(any_hit(BothForms(scene), {{1, 2, 0}, {0, 0, 1}}, {0, 1}, {1, 0}));
 }
 
 TEST(Bvh, TriangleSoup) {
@@ -190,7 +190,7 @@ TEST(Bvh, RaysInThePlaneOfTriangles) {
     scene.build();
     for (int i = 0; i <= 64; ++i) {
         const float y = static_cast<float>(i) * 0.125f;
-        const Hit hit = closest_hit(scene.view(), {{-1, y, 0}, {1, 0, 0}}, {});
+        const Hit hit = closest_hit(BothForms(scene), {{-1, y, 0}, {1, 0, 0}}, {});
         ASSERT_TRUE(hit.found());
         EXPECT_GE(hit.t, 1.0f);
         EXPECT_LE(hit.t, 10.0f);
@@ -209,21 +209,21 @@ TEST(Bvh, InvalidRays) {
         for (int axis = 0; axis < 3; ++axis) {
             Ray ray{{0, 0, 0}, {0, 0, 1}};
             (&ray.origin.x)[axis] = bad;
-            EXPECT_FALSE(closest_hit(scene.view(), ray, {}).found());
-            EXPECT_FALSE(any_hit(scene.view(), ray, {}, {}));
+            EXPECT_FALSE(closest_hit(BothForms(scene), ray, {}).found());
+            EXPECT_FALSE(any_hit(BothForms(scene), ray, {}, {}));
             ray = {{0, 0, 0}, {0, 0, 1}};
             (&ray.direction.x)[axis] = bad;
-            EXPECT_FALSE(closest_hit(scene.view(), ray, {}).found());
-            EXPECT_FALSE(any_hit(scene.view(), ray, {}, {}));
+            EXPECT_FALSE(closest_hit(BothForms(scene), ray, {}).found());
+            EXPECT_FALSE(any_hit(BothForms(scene), ray, {}, {}));
         }
     }
-    EXPECT_FALSE(closest_hit(scene.view(), {{0, 0, 0}, {0, 0, 0}}, {}).found());
-    EXPECT_FALSE(any_hit(scene.view(), {{0, 0, 0}, {0, -0.0f, 0}}, {}, {}));
+    EXPECT_FALSE(closest_hit(BothForms(scene), {{0, 0, 0}, {0, 0, 0}}, {}).found());
+    EXPECT_FALSE(any_hit(BothForms(scene), {{0, 0, 0}, {0, -0.0f, 0}}, {}, {}));
     for (const float t_max : {0.0f, -1.0f, nan, -inf}) {
-        EXPECT_FALSE(closest_hit(scene.view(), {{0, 0, 0}, {0, 0, 1}, t_max}, {}).found());
-        EXPECT_FALSE(any_hit(scene.view(), {{0, 0, 0}, {0, 0, 1}, t_max}, {}, {}));
+        EXPECT_FALSE(closest_hit(BothForms(scene), {{0, 0, 0}, {0, 0, 1}, t_max}, {}).found());
+        EXPECT_FALSE(any_hit(BothForms(scene), {{0, 0, 0}, {0, 0, 1}, t_max}, {}, {}));
     }
-    EXPECT_TRUE(closest_hit(scene.view(), {{0, 0, 0}, {0, 0, 1}}, {}).found());
+    EXPECT_TRUE(closest_hit(BothForms(scene), {{0, 0, 0}, {0, 0, 1}}, {}).found());
 }
 
 TEST(Bvh, Instances) {

@@ -10,7 +10,7 @@ namespace {
 void expect_no_leak(const Mesh& mesh, const RayScene& scene, Vec3 center, float inner, int rays, uint32_t seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<float> uniform(0, 1);
-    const SceneView view = scene.view();
+    const BothForms view(scene);
     const Affine& placement = scene.instances[0].object_to_world;
     int leaks = 0;
     for (int i = 0; i < rays; ++i) {

@@ -284,7 +284,7 @@ TEST(GpuMemory, WithoutRoomForTheSceneTheCpuRenders) {
     const MemoryLimit limit(1000);
     GpuRender render(scene, balanced());
     ASSERT_EQ(render.renderer->notes().size(), 1u);
-    const size_t bytes = scene->bytes(k_device_alignment)[ScenePart::geometry];
+    const size_t bytes = scene->bytes(NodeForm::compressed, k_device_alignment)[ScenePart::geometry];
     EXPECT_EQ(render.renderer->notes()[0], "device HOST: allocating " + std::to_string(bytes) +
                                                " bytes for the scene's geometry: out of memory; rendering on the CPU");
     EXPECT_EQ(render.renderer->iterate(2), 2u);
@@ -343,7 +343,7 @@ protected:
     }
     uint64_t bytes_of(std::initializer_list<ScenePart> parts) const {
         uint64_t sum = 0;
-        for (const ScenePart part : parts) sum += scene->bytes()[part];
+        for (const ScenePart part : parts) sum += scene->bytes(NodeForm::compressed)[part];
         return sum;
     }
     void SetUp() override {
@@ -431,7 +431,7 @@ TEST_F(GpuUpdate, OfTheGeometryUploadsAll) {
     const uint64_t before = render.renderer->uploaded_bytes();
     scene = crowded_room(every_light().front().add, 20);
     render.renderer->update(scene, for_scene(scene->view(), balanced()), 0, 1000);
-    const ByPart<size_t> bytes = scene->bytes();
+    const ByPart<size_t> bytes = scene->bytes(NodeForm::compressed);
     EXPECT_EQ(render.renderer->uploaded_bytes() - before, std::accumulate(bytes.of.begin(), bytes.of.end(), size_t{0}));
     EXPECT_EQ(render.renderer->iterate(3), 3u);
     render.renderer->settle();

@@ -1,0 +1,224 @@
+// Rays per second of a GPU through wide and through compressed nodes, what they read, and how much of the bandwidth of its
+// memory that is; see README.md. Compiled with VLP_COUNT_VISITS, by which the host counts.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "bench/ray_scenes.h"
+#include "bvh/compressed_traverse.h"
+#include "bvh/traverse.h"
+
+namespace vlp {
+
+// What a thread does with a ray; 1 or the distance of what it hits, 0: nothing.
+struct WideClosest {
+    VLP_HD static float trace(const SceneView& scene, const Ray& ray) {
+        const Hit hit = closest_hit(scene, ray, {});
+        return hit.found() ? hit.t : 0;
+    }
+};
+struct CompressedClosest {
+    VLP_HD static float trace(const SceneView& scene, const Ray& ray) {
+        const Hit hit = closest_hit_compressed(scene, ray, {});
+        return hit.found() ? hit.t : 0;
+    }
+};
+struct WideAny {
+    VLP_HD static float trace(const SceneView& scene, const Ray& ray) { return any_hit(scene, ray, {}, {}) ? 1 : 0; }
+};
+struct CompressedAny {
+    VLP_HD static float trace(const SceneView& scene, const Ray& ray) {
+        return any_hit_compressed(scene, ray, {}, {}) ? 1 : 0;
+    }
+};
+
+namespace bench {
+namespace {
+
+constexpr uint32_t k_block_size = 128;
+constexpr int k_repeats = 20;
+constexpr uint32_t k_counted = 1u << 16;  // rays that the host counts
+
+void check(cudaError_t error) {
+    if (error != cudaSuccess) throw std::runtime_error(cudaGetErrorString(error));
+}
+
+template <typename Search>
+__global__ void __launch_bounds__(k_block_size)
+    trace_rays(const __grid_constant__ SceneView scene, const Ray* rays, uint32_t count, float* found) {
+    const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+    if (i < count) found[i] = Search::trace(scene, rays[i]);
+}
+
+__global__ void copy_rows(const float4* from, float4* to, size_t count) {
+    for (size_t i = blockIdx.x * size_t{blockDim.x} + threadIdx.x; i < count; i += size_t{gridDim.x} * blockDim.x) {
+        to[i] = from[i];
+    }
+}
+
+template <typename T>
+class OnDevice {
+public:
+    explicit OnDevice(size_t count) : count_(count) {
+        check(cudaMalloc(&data_, std::max<size_t>(count, 1) * sizeof(T)));
+    }
+    explicit OnDevice(const std::vector<T>& v) : OnDevice(v.size()) {
+        check(cudaMemcpy(data_, v.data(), v.size() * sizeof(T), cudaMemcpyHostToDevice));
+    }
+    OnDevice(const OnDevice&) = delete;
+    OnDevice& operator=(const OnDevice&) = delete;
+    ~OnDevice() { cudaFree(data_); }
+
+    T* data() const { return data_; }
+    std::vector<T> read() const {
+        std::vector<T> v(count_);
+        check(cudaMemcpy(v.data(), data_, count_ * sizeof(T), cudaMemcpyDeviceToHost));
+        return v;
+    }
+
+private:
+    T* data_ = nullptr;
+    size_t count_;
+};
+
+// Of the fastest of several launches, after one to warm up.
+template <typename Launch>
+double seconds_of(const Launch& launch) {
+    cudaEvent_t begin, end;
+    check(cudaEventCreate(&begin));
+    check(cudaEventCreate(&end));
+    float best = k_infinity;
+    for (int i = 0; i <= k_repeats; ++i) {
+        check(cudaEventRecord(begin));
+        launch();
+        check(cudaGetLastError());
+        check(cudaEventRecord(end));
+        check(cudaEventSynchronize(end));
+        float milliseconds = 0;
+        check(cudaEventElapsedTime(&milliseconds, begin, end));
+        if (i > 0) best = std::min(best, milliseconds);
+    }
+    cudaEventDestroy(begin), cudaEventDestroy(end);
+    return 1e-3 * static_cast<double>(best);
+}
+
+// Bytes a second, read and written.
+double copy_bandwidth() {
+    constexpr size_t k_rows = size_t{1} << 26;  // of 16 bytes: a gigabyte
+    const OnDevice<float4> from(k_rows), to(k_rows);
+    check(cudaMemset(from.data(), 0, k_rows * sizeof(float4)));
+    const double seconds = seconds_of([&] { copy_rows<<<8192, 256>>>(from.data(), to.data(), k_rows); });
+    return 2.0 * k_rows * sizeof(float4) / seconds;
+}
+
+struct Form {
+    const char* name;
+    size_t node_bytes;
+    SceneView here, there;  // on the host and on the device
+};
+
+struct Measured {
+    double rays_per_second, bytes_per_ray;
+    std::vector<float> found;
+};
+
+template <typename Search>
+Measured measure(const Form& form, const std::vector<Ray>& rays) {
+    const OnDevice<Ray> rays_there(rays);
+    const OnDevice<float> found(rays.size());
+    const auto count = static_cast<uint32_t>(rays.size());
+    const double seconds = seconds_of([&] {
+        trace_rays<Search><<<(count + k_block_size - 1) / k_block_size, k_block_size>>>(form.there, rays_there.data(),
+                                                                                        count, found.data());
+    });
+    visited_nodes = visited_blocks = 0;
+    const uint32_t step = std::max(1u, count / k_counted);
+    double counted = 0;
+    for (uint32_t i = 0; i < count; i += step, ++counted) Search::trace(form.here, rays[i]);
+    const double tree = static_cast<double>(visited_nodes) * static_cast<double>(form.node_bytes) +
+                        static_cast<double>(visited_blocks) * sizeof(TriangleBlock);
+    return {count / seconds, tree / counted + sizeof(Ray) + sizeof(float), found.read()};
+}
+
+// How many differ by more than rounding, which decides between triangles that share an edge.
+size_t differing(const std::vector<float>& a, const std::vector<float>& b) {
+    size_t count = 0;
+    for (size_t i = 0; i < a.size(); ++i) count += !(std::fabs(a[i] - b[i]) <= 1e-5f * std::fabs(a[i]));
+    return count;
+}
+
+int run(const char* out) {
+    check(cudaFree(nullptr));  // is there a GPU?
+    ThreadPool pool;
+    const BenchScene scene = make_scene(1);
+    const Bvh bvh = build_bvh(scene.geometries, scene.instances, pool);
+    const std::vector<CompressedNode> compressed = compress(bvh.nodes, pool);
+    const OnDevice<BvhNode> nodes_there(bvh.nodes);
+    const OnDevice<CompressedNode> compressed_there(compressed);
+    const OnDevice<TriangleBlock> triangles(bvh.triangle_blocks);
+    const OnDevice<SphereBlock> spheres(bvh.sphere_blocks);
+    const OnDevice<uint32_t> roots(bvh.instance_roots);
+    const OnDevice<InstanceView> instances(scene.instances);
+
+    Form wide{"wide", sizeof(BvhNode), scene.view(bvh), {}};
+    wide.there.instances = instances.data();
+    wide.there.bvh = {nodes_there.data(), triangles.data(), spheres.data(), roots.data(), bvh.root};
+    Form packed{"compressed", sizeof(CompressedNode), wide.here, wide.there};
+    packed.here.bvh.nodes = packed.there.bvh.nodes = nullptr;
+    packed.here.bvh.compressed = compressed.data(), packed.there.bvh.compressed = compressed_there.data();
+
+    std::vector<RaySet> sets = make_rays(scene, bvh);
+    RaySet scattered = sets[1];  // bounces: neighbouring threads have nothing in common
+    scattered.name = "scattered bounce";
+    std::shuffle(scattered.rays.begin(), scattered.rays.end(), std::mt19937(1));
+    sets.insert(sets.begin() + 2, std::move(scattered));
+
+    const double bandwidth = copy_bandwidth();
+    std::FILE* const file = std::fopen(out, "w");
+    if (!file) throw std::runtime_error(std::string("cannot write ") + out);
+    std::fprintf(file, "{\"scene\": \"%s\", \"primitives\": %zu, \"copy_bytes_per_second\": %.4g, \"rays\": [",
+                 scene.name.c_str(), scene.primitive_count(), bandwidth);
+    std::printf("\n%s, %zu primitives; memory copies at %.0f GB/s\n\n", scene.name.c_str(), scene.primitive_count(),
+                bandwidth * 1e-9);
+    std::printf("| rays | nodes | M rays/s | bytes a ray | GB/s | of the copy's |\n|---|---|---|---|---|---|\n");
+    const char* separator = "";
+    size_t wrong = 0;
+    for (const RaySet& set : sets) {
+        const Measured of_wide = set.any ? measure<WideAny>(wide, set.rays) : measure<WideClosest>(wide, set.rays);
+        const Measured of_packed =
+            set.any ? measure<CompressedAny>(packed, set.rays) : measure<CompressedClosest>(packed, set.rays);
+        wrong += differing(of_wide.found, of_packed.found);
+        for (const auto& [form, m] : {std::pair{&wide, &of_wide}, std::pair{&packed, &of_packed}}) {
+            const double rate = m->rays_per_second * m->bytes_per_ray;
+            std::printf("| %s | %s | %.0f | %.0f | %.0f | %.2f |\n", set.name, form->name, m->rays_per_second * 1e-6,
+                        m->bytes_per_ray, rate * 1e-9, rate / bandwidth);
+            std::fprintf(file,
+                         "%s\n {\"rays\": \"%s\", \"nodes\": \"%s\", \"rays_per_second\": %.4g, "
+                         "\"bytes_per_ray\": %.1f, \"share_of_copy\": %.3f}",
+                         separator, set.name, form->name, m->rays_per_second, m->bytes_per_ray, rate / bandwidth);
+            separator = ",";
+        }
+    }
+    std::fprintf(file, "],\n \"differing\": %zu}\n", wrong);
+    std::fclose(file);
+    if (wrong > 0) std::fprintf(stderr, "gpu_rays: %zu rays found something else through compressed nodes\n", wrong);
+    return wrong > 0 ? 1 : 0;
+}
+
+}  // namespace
+}  // namespace bench
+}  // namespace vlp
+
+// gpu_rays OUT.json
+int main(int argc, char** argv) {
+    try {
+        return vlp::bench::run(argc > 1 ? argv[1] : "gpu_rays.json");
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "gpu_rays: %s\n", error.what());
+        return 1;
+    }
+}
