@@ -9,7 +9,7 @@ namespace vlp {
 
 // An eye walk: its vertices' densities from the lens z_0 on, and where it stands.
 struct EyeWalk {
-    VertexDensity vertices[k_max_walk + 1];
+    VertexDensity* vertices = nullptr;  // K + 1 of whoever traces the walk
     uint32_t t = 1;     // vertices so far, the lens counted
     Rgb throughput = rgb(1);
     SurfacePoint surface;  // z_{t-1}
@@ -108,12 +108,13 @@ VLP_HD inline void prefetch_virtual_light_points([[maybe_unused]] const LightVer
 }
 
 // One of the C connections at z_{t-1}: of M candidates, drawn evenly over the V stored VLPs, one is kept in proportion to the
-// light that it would bring if nothing stood between (Talbot, Cline & Egbert 2005), and a ray is sent to that one. The
-// estimate is of what all VLPs of an iteration bring; the caller averages over C. One candidate stands for V VLPs of
-// N paths, and the one that is kept for all M.
+// light that it would bring if nothing stood between (Talbot, Cline & Egbert 2005), and a ray is sent to that one, by
+// `see`. The estimate is of what all VLPs of an iteration bring, and this is its share of it. One candidate stands for V
+// VLPs of N paths, and the one that is kept for all M.
+template <typename See>
 VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, const PassSettings& pass,
                                                        const LightVertexCache& cache, const EyeWalk& eye,
-                                                       const Bsdf& eye_bsdf, uint32_t u, float u_keep) {
+                                                       const Bsdf& eye_bsdf, uint32_t u, float u_keep, See& see) {
     const uint32_t candidates = pass.vlp_candidates;
     VlpConnection kept{{.t = eye.t}, {}, {}};
     float kept_light = 0, light = 0;
@@ -130,8 +131,10 @@ VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, c
         if (keep) kept = next, kept_light = next_light;
     }
     if (!(kept_light > 0)) return kept.found;
-    const Rgb through = transmittance(scene, anchor_of(eye.surface), kept.vlp, kept.direction);
-    kept.found.value *= through * (light / (kept_light * static_cast<float>(candidates)));
+    const Rgb through = see(shadow_ray(anchor_of(eye.surface), kept.vlp, kept.direction));
+    const float share = 1.0f / static_cast<float>(pass.vlp_connections);
+    kept.found.value *= light / (kept_light * static_cast<float>(candidates)) * share;
+    kept.found.value *= through;
     return kept.found;
 }
 
