@@ -39,7 +39,7 @@ size_t stack_bytes_of() {
 
 size_t most_stack_bytes() {
     return std::max({stack_bytes_of<LightPass>(), stack_bytes_of<EyePass>(), stack_bytes_of<GuidedEyePass>()});
-}
+}  // those of a wavefront are smaller
 
 class CudaDevice {
 public:
@@ -104,7 +104,7 @@ public:
         cub::DeviceScan::ExclusiveSum(nullptr, needed, counts, counts, static_cast<int>(n), passes_);
         if (needed > scratch_bytes) throw std::runtime_error("device CUDA: a scan needs more memory than foreseen");
         check_cuda(cub::DeviceScan::ExclusiveSum(scratch, scratch_bytes, counts, counts, static_cast<int>(n), passes_),
-                   "counting virtual light points");
+                   "a scan");
     }
 
     void record(Event& event, Queue in) { check_cuda(cudaEventRecord(event.event, stream(in)), "the passes"); }
