@@ -41,10 +41,11 @@ public:
         counters.eye_samples = 0;
         *counts_here_.data() = {};
         device_.clear(counts_.data(), counts_.bytes());
+        const uint64_t uploaded = counters.uploaded;
         place_scene(scene);
         place_film(scene.window(), pass);
         place_light_vertices(pass);
-        place_wavefront();
+        place_wavefront(counters.uploaded != uploaded);
     }
 
     bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
@@ -237,13 +238,17 @@ private:
         wait_for(Queue::passes);
     }
 
-    // After all else, as the eye pass can do without.
-    void place_wavefront() {
+    // After all else, as the eye pass can do without. Which form is faster is found out anew unless the camera alone moved.
+    void place_wavefront(bool other_scene) {
         const std::optional<EyeForm> forced = forced_eye_form();
-        form_ = forced ? EyeFormChoice(*forced) : EyeFormChoice();
-        if (forced == EyeForm::paths) return wavefront_.release();
+        if (forced == EyeForm::paths) {
+            wavefront_.release();
+            form_ = EyeFormChoice(*forced);
+            return;
+        }
         try {
-            wavefront_.place(pass_, window_.pixel_count());
+            if (!wavefront_.place(pass_, window_.pixel_count()) && !other_scene) return;
+            form_ = forced ? EyeFormChoice(*forced) : EyeFormChoice();
             pass_.guides ? wavefront_.template start<GuidedSink>() : wavefront_.template start<PixelSink>();
             wait_for(Queue::passes);
         } catch (const OutOfDeviceMemory&) {
@@ -269,9 +274,12 @@ private:
     bool run_eye_pass(const EyePass& eye, const Paths& paths, const std::atomic<bool>& stop) {
         if (form_.next() == EyeForm::paths) return launch_in_batches(pixels(), paths, stop);
         const uint32_t before = counters.work_done;
-        return wavefront_.template run<Sink>(eye, stop, [&](uint64_t begun) {
-            counters.work_done = before + static_cast<uint32_t>(std::min<uint64_t>(begun, pixels()));
-        });
+        const auto tell = [&](uint64_t samples) {
+            counters.work_done = before + static_cast<uint32_t>(std::min<uint64_t>(samples, pixels()));
+        };
+        if (!wavefront_.template run<Sink>(eye, stop, tell)) return false;
+        tell(pixels());
+        return true;
     }
 
     bool run_light_pass(uint32_t iteration, const std::atomic<bool>& stop) {

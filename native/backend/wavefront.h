@@ -17,10 +17,10 @@ class Wavefront {
 public:
     explicit Wavefront(Device& device) : device_(device) {}
 
-    // Makes room for a pass over so many pixels. Throws OutOfDeviceMemory, and then has none.
-    void place(const PassSettings& pass, size_t pixels) {
+    // Makes room for a pass over so many pixels, if it is not what there is. Throws OutOfDeviceMemory, and then has none.
+    bool place(const PassSettings& pass, size_t pixels) {
         const WavefrontSize size(pass, pixels);
-        if (size_ && size == *size_) return;
+        if (size_ && size == *size_) return false;
         release();
         try {
             slots_ = buffer<PathSlot>(size.slots);
@@ -40,6 +40,7 @@ public:
             throw;
         }
         size_ = size;
+        return true;
     }
     void release() {
         size_.reset();

@@ -1,6 +1,6 @@
-// What a GPU's threads do in a wavefront of eye paths (Laine, Karras & Aila 2013): the steps of trace_eye_path, one kernel each,
-// over many paths that wait between them in memory. So threads that search the tree do nothing else, and those that shade
-// do so side by side with others on the same material.
+// What a GPU's threads do in a wavefront of eye paths (Laine, Karras & Aila 2013): the steps of trace_eye_path, a kernel
+// each, over many paths that wait between them in memory. So threads that search the tree do nothing else, and those that
+// shade do so side by side with others on the same material.
 #pragma once
 
 #include "backend/gpu_kernels.h"
@@ -90,7 +90,7 @@ struct WavefrontSize {
 
     WavefrontSize(const PassSettings& pass, size_t pixel_count)
         : vertices_each(pass.eye_path_length + 1),
-          connections_each(pass.light_samples + pass.vlp_connections),
+          connections_each(pass.light_samples + (pass.kappa > 0 ? pass.vlp_connections : 0)),
           pixels(static_cast<uint32_t>(pixel_count)),
           samples(pixel_count * (pass.adaptive ? k_most_samples_a_pixel : 1)),
           finds(samples * (pass.guides ? sizeof(SampleFinds<GuidedSink>) : sizeof(SampleFinds<PixelSink>))) {

@@ -40,8 +40,8 @@ struct StepDraws {
 };
 
 // Begins a path through pixel (x, y) of the full picture, y counted from the bottom. `vertices`: room for K + 1.
-VLP_HD inline EyePath begin_eye_path(const SceneView& scene, const PassSettings& pass, EyeSample numbers, uint32_t x,
-                                     uint32_t y, VertexDensity* vertices, Sampler& sampler) {
+VLP_HD VLP_FORCE_INLINE EyePath begin_eye_path(const SceneView& scene, const PassSettings& pass, EyeSample numbers,
+                                               uint32_t x, uint32_t y, VertexDensity* vertices, Sampler& sampler) {
     uint32_t seed = hash(pass.seed, k_eye_stream, y * scene.camera.width + x);
     if (numbers.sequence > 0) seed = hash(seed, numbers.sequence);
     sampler = make_sampler(seed, numbers.index);
@@ -103,8 +103,8 @@ VLP_HD VLP_FORCE_INLINE Met arrive(const SceneView& scene, const PassSettings& p
     return met;
 }
 
-// Listing 3: joins the last vertex to lights and VLPs. `join(ShadowRay)` tells what gets through, and `join.add(Contribution)` takes
-// what was found, black or not: S light samples, then C connections where there are VLPs.
+// Joins the last vertex to lights and VLPs. `join(ShadowRay)` tells what gets through, and `join.add(Contribution)` takes
+// what was found, black or not: of S light samples, then of C connections where there are VLPs.
 template <typename Join>
 VLP_HD VLP_FORCE_INLINE void gather(const SceneView& scene, const PassSettings& pass, const LightVertexCache& cache,
                                     const EyePath& path, Sampler& sampler, Join& join) {

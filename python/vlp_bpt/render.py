@@ -52,10 +52,10 @@ class Progress:
 @dataclass(frozen=True)
 class Statistics:
     """What a render did and took. eye_samples and light_paths: in all; memory: bytes by device and part; dropped:
-    non-finite samples left out; eye_form: how the eye paths were traced last, "paths" one by one or, on a GPU,
-    as a "wavefront" of their steps (native/backend/wavefront.h); build_seconds: uploading the scene and building its hierarchy, as far as it changed;
-    denoise_seconds: of denoising the last picture, not part of seconds; noise: of the picture before denoising, as
-    `vlp_bpt.noise` measures it, None without `noise_threshold` and before it was told."""
+    non-finite samples left out; eye_form: of the eye pass, "paths" or "wavefront" (native/backend/eye_form.h);
+    build_seconds: uploading the scene and building its hierarchy, as far as it changed; denoise_seconds: of denoising
+    the last picture, not part of seconds; noise: of the picture before denoising, as `vlp_bpt.noise` measures it, None
+    without `noise_threshold` and before it was told."""
 
     iterations: int
     seconds: float

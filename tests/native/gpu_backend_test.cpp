@@ -1,103 +1,13 @@
 // The GPU back end's own logic, with the host as its device: buffers, batches, streams, memory that runs out, devices that
-// fail and scenes that change. Pictures are the CPU back end's, bit for bit.
-#include "host_device.h"
-#include "renderer/renderer.h"
-#include "transport_scenes.h"
+// fail and scenes that change. Pictures are the CPU back end's, see gpu_cases.h.
+#include "gpu_cases.h"
 
-#include <gtest/gtest.h>
-
-#include <cstdlib>
 #include <cstring>
 #include <map>
 #include <numeric>
 
 namespace vlp::test {
 namespace {
-
-struct NamedPass {
-    const char* name;
-    PassSettings pass;
-
-    friend void PrintTo(const NamedPass& p, std::ostream* out) { *out << p.name; }
-};
-
-PassSettings balanced(uint32_t light_paths = 500) {
-    PassSettings pass;
-    pass.light_path_length = 12, pass.eye_path_length = 16, pass.light_paths = light_paths;
-    pass.splats = pass.roulette = true;
-    return pass;
-}
-
-std::vector<NamedPass> passes() {
-    PassSettings paper;
-    paper.light_paths = 576, paper.weighting = Weighting::uniform;
-    PassSettings splats_alone = balanced();
-    splats_alone.vlp_connections = 0;
-    PassSettings path_tracing = splats_alone;
-    path_tracing.splats = false;
-    PassSettings many = balanced();
-    many.light_path_length = many.eye_path_length = k_max_walk;
-    many.vlp_connections = 2, many.vlp_candidates = 3, many.light_samples = 0;
-    PassSettings guided = balanced(), guided_alone = path_tracing;
-    guided.guides = guided_alone.guides = true;
-    return {{"paper", paper},
-            {"guided", guided},
-            {"guided_path_tracing", guided_alone},
-            {"balanced", balanced()},
-            {"splats_alone", splats_alone},
-            {"path_tracing", path_tracing},
-            {"many", many}};
-}
-
-std::shared_ptr<Scene> room(uint32_t pixels = 24) { return crowded_room(every_light().back().add, pixels); }
-
-// The sums of iterations [0, count) by the CPU.
-std::vector<ExactSum> cpu_sums(const Scene& scene, const PassSettings& pass, uint32_t count) {
-    const auto cpu = make_cpu_backend(scene, pass, 1);
-    Film film(scene.window(), pass.splats, pass.guides);
-    const std::atomic<bool> go_on{false};
-    for (uint32_t i = 0; i < count; ++i) EXPECT_TRUE(cpu->run_iteration(i, film, go_on));
-    return {film.sums().begin(), film.sums().end()};
-}
-
-// Where the compiler fuses products with sums, it does so in other places of a wavefront than of the CPU's function: bits
-// are the same in builds that cannot.
-#ifdef __FP_FAST_FMAF
-constexpr bool k_fuses = true;
-#else
-constexpr bool k_fuses = false;
-#endif
-
-void expect_same_sums(std::span<const ExactSum> a, std::span<const ExactSum> b) {
-    ASSERT_EQ(a.size(), b.size());
-    size_t differing = 0, far = 0;
-    for (size_t i = 0; i < a.size(); ++i) {
-        differing += a[i].fraction != b[i].fraction || a[i].whole != b[i].whole;
-        far += std::abs(a[i].value() - b[i].value()) > 1e-4 * std::abs(b[i].value()) + 1e-9;
-    }
-    if (k_fuses && forced_eye_form() != EyeForm::paths) {
-        EXPECT_LE(far, a.size() / 100) << "of " << a.size();  // where a path has turned off
-    } else {
-        EXPECT_EQ(differing, 0u) << "of " << a.size();
-    }
-}
-
-// Limits what all devices together may take, while it lives.
-struct MemoryLimit {
-    explicit MemoryLimit(size_t bytes) { setenv("VLP_BPT_GPU_MEMORY", std::to_string(bytes).c_str(), 1); }
-    ~MemoryLimit() { unsetenv("VLP_BPT_GPU_MEMORY"); }
-    MemoryLimit(const MemoryLimit&) = delete;
-    MemoryLimit& operator=(const MemoryLimit&) = delete;
-};
-
-// The form of eye passes, while it lives; "" where the back end chooses.
-struct FormOfEyePasses {
-    explicit FormOfEyePasses(const char* name) { setenv("VLP_BPT_GPU_EYE_PASS", name, 1); }
-    ~FormOfEyePasses() { unsetenv("VLP_BPT_GPU_EYE_PASS"); }
-    FormOfEyePasses(const FormOfEyePasses&) = delete;
-    FormOfEyePasses& operator=(const FormOfEyePasses&) = delete;
-};
-constexpr const char* k_forms[] = {"paths", "wavefront", ""};
 
 class GpuPasses : public testing::TestWithParam<std::tuple<NamedPass, const char*>> {};
 
@@ -207,66 +117,6 @@ TEST(GpuBackend, BatchesAreBounded) {
     }
 }
 
-// More samples than paths at a time: those that end make room for others.
-TEST(Wavefront, BeginsSamplesWherePathsEnd) {
-    const auto scene = room(520);
-    PassSettings pass = balanced();
-    pass.light_path_length = 2, pass.eye_path_length = 4;
-    pass = for_scene(scene->view(), pass);
-    ASSERT_LT(WavefrontSize(pass, scene->window().pixel_count()).slots, scene->window().pixel_count());
-    const FormOfEyePasses form("wavefront");
-    HostMachine machine;
-    HostBackend gpu(*scene, pass, machine);
-    Film film(scene->window(), pass.splats);
-    EXPECT_TRUE(gpu.run_iteration(0, film, false));
-    gpu.collect(film);
-    EXPECT_EQ(gpu.counters.work_done, gpu.counters.work_total);
-    expect_same_sums(film.sums(), cpu_sums(*scene, pass, 1));
-}
-
-TEST(Wavefront, OfManyConnectionsHasFewerPaths) {
-    PassSettings pass = balanced();
-    pass.light_samples = pass.vlp_connections = 64;
-    const WavefrontSize size(pass, 1u << 20), small(balanced(), 1u << 20);
-    EXPECT_LE(size.slots * size.slot_bytes(), WavefrontSize::k_most_bytes);
-    EXPECT_GT(size.slots, 20'000u);
-    EXPECT_EQ(small.slots, WavefrontSize::k_most_slots);
-}
-
-TEST(EyeFormChoice, TakesTheFasterForm) {
-    for (const EyeForm faster : {EyeForm::paths, EyeForm::wavefront}) {
-        EyeFormChoice choice;
-        EXPECT_EQ(choice.next(), EyeForm::paths);
-        int timed = 0;
-        for (; choice.is_open(); ++timed) choice.took((choice.next() == faster ? 1.0 : 2.0) + (timed == 3 ? 9 : 0));
-        EXPECT_EQ(timed, 5);
-        EXPECT_EQ(choice.next(), faster);
-    }
-    for (const EyeForm form : {EyeForm::paths, EyeForm::wavefront}) {
-        EXPECT_FALSE(EyeFormChoice(form).is_open());
-        EXPECT_EQ(EyeFormChoice(form).next(), form);
-    }
-}
-
-TEST(EyeFormChoice, IsMadeAnewForAnotherScene) {
-    const auto scene = room();
-    const PassSettings pass = for_scene(scene->view(), balanced());
-    HostMachine machine;
-    HostBackend gpu(*scene, pass, machine);
-    Film film(scene->window(), pass.splats);
-    for (int render = 0; render < 2; ++render) {
-        std::vector<EyeForm> forms;
-        for (uint32_t i = 0; i < 8; ++i) {
-            EXPECT_TRUE(gpu.run_iteration(i, film, false));
-            forms.push_back(gpu.counters.eye_form);
-        }
-        EXPECT_EQ(std::count(forms.begin(), forms.begin() + 5, EyeForm::wavefront), 2);
-        EXPECT_EQ(forms[6], forms[5]);
-        EXPECT_EQ(forms[7], forms[5]);
-        gpu.update(*scene, pass);
-    }
-}
-
 TEST(GpuBackend, WhatIsStoppedLeavesTheSumsAsTheyWere) {
     const auto scene = room(8);
     const PassSettings pass = for_scene(scene->view(), balanced(40));
@@ -330,39 +180,6 @@ TEST(CpuBackend, TakesTheMemoryThatWasPlanned) {
         MemoryByDevice taken = renderer.memory();
         EXPECT_EQ(taken["CPU"].total(), plan["CPU"].total()) << named.name;
         EXPECT_EQ(taken.size(), 1u);
-    }
-}
-
-// With the GPU of this process being the host.
-struct GpuRender {
-    explicit GpuRender(std::shared_ptr<Scene> scene, const PassSettings& asked, const std::string& device = "CUDA")
-        : pass(for_scene(scene->view(), asked)) {
-        const MakeBackend make_gpu = [this](const Scene& of, const PassSettings& with) {
-            return std::make_unique<HostBackend>(of, with, machine);
-        };
-        Devices devices = make_devices(device, *scene, pass, 1, make_gpu);
-        renderer = std::make_unique<Renderer>(scene, pass, scene->window(), std::move(devices), 0, 1000);
-    }
-
-    HostMachine machine;
-    PassSettings pass;
-    std::unique_ptr<Renderer> renderer;
-};
-
-TEST(GpuMemory, WithoutRoomForAWavefrontThereIsNone) {
-    const auto scene = room();
-    const PassSettings asked = for_scene(scene->view(), balanced(4000));
-    MemoryByDevice plan;
-    add_gpu_memory(plan, *scene, asked);
-    for (const size_t missing : {size_t{1}, WavefrontSize(asked, scene->window().pixel_count()).bytes()}) {
-        const MemoryLimit limit(plan["CUDA"].total() - missing);
-        GpuRender render(scene, balanced(4000));
-        EXPECT_EQ(render.pass.light_paths, 4000u);
-        EXPECT_EQ(render.renderer->iterate(2), 2u);
-        EXPECT_TRUE(render.renderer->notes().empty());
-        EXPECT_EQ(render.renderer->eye_form(), EyeForm::paths);
-        render.renderer->settle();
-        expect_same_sums(render.renderer->film().sums(), cpu_sums(*scene, asked, 2));
     }
 }
 
