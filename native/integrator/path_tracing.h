@@ -39,6 +39,16 @@ struct StepDraws {
     }
 };
 
+// Member by member: processors are slow to load at once what was stored in parts.
+VLP_HD VLP_FORCE_INLINE void set_out(Way& way, Vec3 origin, Vec3 direction, float t_max, PrimitiveId skip) {
+    way.ray.origin = origin;
+    way.ray.direction = direction;
+    way.ray.t_max = t_max;
+    way.skip = skip;
+    way.passed = 0;
+    way.throughput = rgb(1);
+}
+
 // Begins a path through pixel (x, y) of the full picture, y counted from the bottom. `vertices`: room for K + 1.
 VLP_HD VLP_FORCE_INLINE EyePath begin_eye_path(const SceneView& scene, const PassSettings& pass, EyeSample numbers,
                                                uint32_t x, uint32_t y, VertexDensity* vertices, Sampler& sampler) {
@@ -47,12 +57,13 @@ VLP_HD VLP_FORCE_INLINE EyePath begin_eye_path(const SceneView& scene, const Pas
     sampler = make_sampler(seed, numbers.index);
     const Vec2 center{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
     const Vec2 film = center + sample(pass.filter, pass.filter_width, scene.filter_tables, sampler.next_2d());
-    const Ray ray = sample_ray(scene.camera, film, scene.camera.aperture_radius > 0 ? sampler.next_2d() : Vec2{});
+    const Vec2 u_lens = scene.camera.aperture_radius > 0 ? sampler.next_2d() : Vec2{};
+    const Ray ray = sample_ray(scene.camera, film, u_lens);
 
     vertices[0] = {};
     EyePath path;
     path.eye.vertices = vertices;
-    path.way.ray = ray;
+    set_out(path.way, ray.origin, ray.direction, ray.t_max, {});
     path.seed = seed, path.index = numbers.index;
     SurfacePoint& lens = path.eye.surface;
     lens.position = ray.origin - ray.direction * distance_from_lens(scene.camera, ray);
@@ -158,7 +169,7 @@ VLP_HD VLP_FORCE_INLINE bool go_on(const SceneView& scene, const PassSettings& p
     eye.last().specular = next.specular;
     path.pdf_solid_angle = next.pdf_solid_angle;
     const Anchor from = anchor_of(eye.surface);
-    path.way = {{leave(from, next.direction), next.direction}, from.id};
+    set_out(path.way, leave(from, next.direction), next.direction, k_infinity, from.id);
     return true;
 }
 
