@@ -25,12 +25,20 @@ FILES = 4  # named at most
 Row = tuple[str, ...]
 Table = dict[Row, tuple[Any, ...]]
 
-_KERNEL = re.compile(
-    r"\d(LightPass|CountStored|ListStored|EyePass|GuidedEyePass|Commit|AddMoments|TellVariance"
-    r"|(?:Wide|Compressed)(?:Closest|Any))E"
-)
+_PASSES = "LightPass|CountStored|ListStored|EyePass|GuidedEyePass|Commit|AddMoments|TellVariance"
+_WAVEFRONT = "CountSamples|FindSurfaces|CountKinds|SortPaths|GatherLight|SeeConnections"
+_OF_SINKS = "BeginPaths|ArriveAtSurfaces|GoOn|MeanSamples"
+_BENCH = "(?:Wide|Compressed)(?:Closest|Any)"
+_KERNEL = re.compile(rf"\d(?:({_PASSES}|{_WAVEFRONT}|{_BENCH})|({_OF_SINKS})INS_\d+(Pixel|Guided)SinkEE)E")
 _MACHINE_CUDA = 190
 _DOUBLE = re.compile(r"D(ADD|MUL|FMA|SETP|MNMX)\b|MUFU\.\w+64H|[FI]2[FI]\S*F64")
+
+
+def kernel_of(symbol: str) -> str:
+    """The name of a kernel of our own; "" for another."""
+    if not (match := _KERNEL.search(symbol)):
+        return ""
+    return match[1] or match[2] + (" with guides" if match[3] == "Guided" else "")
 
 
 def parse_log(text: str) -> Table:
@@ -40,8 +48,8 @@ def parse_log(text: str) -> Table:
     stack = stores = loads = 0
     for line in text.splitlines():
         if match := re.search(r"Compiling entry function '(\S+)' for 'sm_(\w+)'", line):
-            name = _KERNEL.search(match[1])
-            entry = (name[1], f"sm_{match[2]}") if name else None
+            name = kernel_of(match[1])
+            entry = (name, f"sm_{match[2]}") if name else None
             stack = stores = loads = 0
         elif match := re.search(r"(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads", line):
             stack, stores, loads = max(stack, int(match[1])), stores + int(match[2]), loads + int(match[3])
@@ -71,8 +79,8 @@ def count_instructions(assembly: str) -> Table:
     kernel = function = file = ""
     for line in assembly.splitlines():
         if match := re.match(r"\s*\.section\s+\.text\.(\S+?),", line):
-            name = _KERNEL.search(match[1])
-            kernel, function = (name[1], "the kernel itself") if name else ("", "")
+            kernel = kernel_of(match[1])
+            function = "the kernel itself" if kernel else ""
         elif match := re.match(r"\s*\.type\s+\$\S+\$(\S+),@function", line):
             function = re.sub(r"^_ZN3vlp(\d+)(.*)", lambda m: m[2][: int(m[1])], match[1])
             function = "divisions and roots" if function.startswith("__cuda_") else function

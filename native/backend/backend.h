@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "backend/eye_form.h"
 #include "backend/memory.h"
 #include "film/film.h"
 #include "integrator/pass.h"
@@ -20,6 +21,7 @@ struct BackendCounters {
     std::atomic<uint64_t> dropped{0};                   // estimates that were not finite, left out
     std::atomic<uint64_t> eye_samples{0};               // of complete iterations
     std::atomic<uint64_t> uploaded{0};                  // bytes of scenes that were copied to the device
+    std::atomic<EyeForm> eye_form{EyeForm::paths};      // of the last eye pass
 };
 
 class Backend {

@@ -16,9 +16,23 @@ void check_cuda(cudaError_t error, const std::string& what) {
     throw std::runtime_error(message);
 }
 
-// Two blocks a processor let every pass keep what it works on in registers.
+// As many blocks a processor as let a kernel keep what it works on in registers: those of the steps of a wavefront take less
+// than whole passes.
 template <typename Body>
-__global__ void __launch_bounds__(k_block_size, 2)
+constexpr uint32_t k_blocks = 4;
+template <>
+constexpr uint32_t k_blocks<LightPass> = 2;
+template <>
+constexpr uint32_t k_blocks<EyePass> = 2;
+template <>
+constexpr uint32_t k_blocks<GuidedEyePass> = 2;
+template <>
+constexpr uint32_t k_blocks<GatherLight> = 3;
+template <>
+constexpr uint32_t k_blocks<FindSurfaces> = 5;
+
+template <typename Body>
+__global__ void __launch_bounds__(k_block_size, k_blocks<Body>)
     run(const __grid_constant__ Body body, uint32_t begin, uint32_t end) {
     const uint32_t i = begin + blockIdx.x * blockDim.x + threadIdx.x;
     if (i < end) body(i);
@@ -39,7 +53,7 @@ size_t stack_bytes_of() {
 
 size_t most_stack_bytes() {
     return std::max({stack_bytes_of<LightPass>(), stack_bytes_of<EyePass>(), stack_bytes_of<GuidedEyePass>()});
-}
+}  // those of a wavefront are smaller
 
 class CudaDevice {
 public:
@@ -104,7 +118,7 @@ public:
         cub::DeviceScan::ExclusiveSum(nullptr, needed, counts, counts, static_cast<int>(n), passes_);
         if (needed > scratch_bytes) throw std::runtime_error("device CUDA: a scan needs more memory than foreseen");
         check_cuda(cub::DeviceScan::ExclusiveSum(scratch, scratch_bytes, counts, counts, static_cast<int>(n), passes_),
-                   "counting virtual light points");
+                   "a scan");
     }
 
     void record(Event& event, Queue in) { check_cuda(cudaEventRecord(event.event, stream(in)), "the passes"); }

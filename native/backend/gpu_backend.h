@@ -1,31 +1,17 @@
-// The GPU back end: one thread a path, sums of the film that stay on the device. What it asks of the device is below, so that
-// the host can stand in for one in tests.
+// The GPU back end: passes in batches of threads, sums of the film that stay on the device.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 
 #include "backend/backend.h"
 #include "backend/device_buffer.h"
 #include "backend/gpu_kernels.h"
+#include "backend/wavefront.h"
 #include "bvh/compressed.h"
 
 namespace vlp {
-
-// A Device queues work in two queues, each in order, and throws std::runtime_error for what goes wrong, then or later:
-//   k_name                                       for messages
-//   void* allocate(bytes, on_host)               null: there is no room
-//   release(data, on_host)
-//   upload(to, from, bytes)                      done when it returns
-//   clear(to, bytes)                             queued in Queue::passes, as are the next two
-//   launch(begin, end, body)                     body(i) for every i of [begin, end)
-//   scan(counts, n, scratch, scratch_bytes)      exclusive sums in place
-//   download(queue, to, from, bytes)            queued; `to` is memory on the host from `allocate`
-//   Event, record(event, queue)                 an event is over when what was queued before is done; at first it is
-//   queue_wait(queue, event)                    what is queued next waits for it
-//   wait(event), bool is_over(event)
-//   size_t stack_bytes()                         of the threads of the passes that run at a time
-enum class Queue : uint8_t { passes, copies };
 
 template <typename Device>
 class GpuBackend final : public Backend {
@@ -35,7 +21,7 @@ public:
     GpuBackend(const Scene& scene, const PassSettings& pass, Arguments&&... arguments)
         : device_(std::forward<Arguments>(arguments)...) {
         counts_ = buffer<PassCounts>(1, "counts");
-        counts_here_ = DeviceBuffer<PassCounts, Device>(device_, 1, "counts on the host", true);
+        counts_here_ = buffer<PassCounts>(1, "counts on the host", true);
         update(scene, pass);
     }
     GpuBackend(const GpuBackend&) = delete;
@@ -56,9 +42,11 @@ public:
         counters.eye_samples = 0;
         *counts_here_.data() = {};
         device_.clear(counts_.data(), counts_.bytes());
+        const uint64_t uploaded = counters.uploaded;
         place_scene(scene);
         place_film(scene.window(), pass);
         place_light_vertices(pass);
+        place_wavefront(counters.uploaded != uploaded);
     }
 
     bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
@@ -72,9 +60,7 @@ public:
         const EyePass eye{
             scene_,         pass_,         rates,          window_,       has_vlps ? slots_.data() : nullptr,
             stored_.data(), frame_.data(), guides_.data(), counts_.data()};
-        const bool went_on = pass_.guides ? launch_in_batches(pixels(), GuidedEyePass{eye}, stop)
-                                          : launch_in_batches(pixels(), eye, stop);
-        if (!went_on) return false;
+        if (!run_eye_pass(eye, stop)) return false;
         device_.download(Queue::passes, counts_here_.data(), counts_.data(), counts_.bytes());
         if (downloading_ > 0) device_.queue_wait(Queue::passes, downloaded_);
         const auto channels = static_cast<uint32_t>(film_channels(pass_));
@@ -89,8 +75,7 @@ public:
     }
 
     void finish() override {
-        device_.record(finished_, Queue::passes);
-        device_.wait(finished_);
+        wait_for(Queue::passes);
         counters.dropped = counts_here_.data()->dropped;
         counters.stored_vlps = pass_.kappa > 0 ? static_cast<uint32_t>(counts_here_.data()->stored_vlps) : 0;
     }
@@ -121,9 +106,10 @@ public:
                     moments_.bytes() + levels_.bytes() + variance_.bytes();
         gpu.light_vertices += slots_.bytes() + stored_.bytes();
         gpu.work += counts_.bytes() + groups_.bytes() + vertices_in_path_.bytes() + scratch_.bytes();
+        gpu.work += wavefront_.bytes();
         gpu.stacks = device_.stack_bytes();
         memory["CPU"].film += sums_here_.bytes() + variance_here_.bytes() + levels_.bytes();
-        memory["CPU"].work += counts_here_.bytes();
+        memory["CPU"].work += counts_here_.bytes() + wavefront_.bytes_here();
     }
 
 private:
@@ -143,17 +129,25 @@ private:
     static constexpr uint32_t k_least_share = 64;
 
     template <typename T>
-    Buffer<T> buffer(size_t count, const std::string& what) {
-        return Buffer<T>(device_, count, what);
+    Buffer<T> buffer(size_t count, const std::string& what, bool on_host = false) {
+        try {
+            return Buffer<T>(device_, count, what, on_host);
+        } catch (const OutOfDeviceMemory&) {
+            if (!wavefront_.placed()) throw;
+            wavefront_.release();  // which can be done without
+            return Buffer<T>(device_, count, what, on_host);
+        }
     }
 
     uint32_t pixels() const { return static_cast<uint32_t>(window_.pixel_count()); }
 
+    void wait_for(Queue queue) {
+        device_.record(finished_, queue);
+        device_.wait(finished_);
+    }
     void wait_for_all() {
-        for (const Queue queue : {Queue::passes, Queue::copies}) {
-            device_.record(finished_, queue);
-            device_.wait(finished_);
-        }
+        wait_for(Queue::passes);
+        wait_for(Queue::copies);
     }
 
     // Uploads the parts that have changed.
@@ -218,8 +212,7 @@ private:
     void plan_samples() {
         device_.launch(0, pixels(), TellVariance{moments_.data(), variance_.data()});
         device_.download(Queue::passes, variance_here_.data(), variance_.data(), variance_.bytes());
-        device_.record(finished_, Queue::passes);
-        device_.wait(finished_);
+        wait_for(Queue::passes);
         plan_.plan({variance_here_.data(), variance_here_.size()});
         device_.upload(levels_.data(), plan_.levels().data(), levels_.bytes());
     }
@@ -248,7 +241,7 @@ private:
     void resize(Buffer<T>& old, size_t count, const char* what, bool on_host = false) {
         if (old.size() == count) return;
         old = {};  // first, to have its room
-        old = Buffer<T>(device_, count, what, on_host);
+        old = buffer<T>(count, what, on_host);
     }
 
     // For no path, so that the device reserves its stacks now and not in the middle of a render.
@@ -259,8 +252,51 @@ private:
         } else {
             device_.launch(0, 0, EyePass{});
         }
-        device_.record(finished_, Queue::passes);
-        device_.wait(finished_);
+        wait_for(Queue::passes);
+    }
+
+    // After all else, as the eye pass can do without. Which form is faster is found out anew unless the camera alone moved.
+    void place_wavefront(bool other_scene) {
+        const std::optional<EyeForm> forced = forced_eye_form();
+        if (forced == EyeForm::paths) {
+            wavefront_.release();
+            form_ = EyeFormChoice(*forced);
+            return;
+        }
+        try {
+            if (!wavefront_.place(pass_, window_.pixel_count()) && !other_scene) return;
+            form_ = forced ? EyeFormChoice(*forced) : EyeFormChoice();
+            pass_.guides ? wavefront_.template start<GuidedSink>() : wavefront_.template start<PixelSink>();
+            wait_for(Queue::passes);
+        } catch (const OutOfDeviceMemory&) {
+            wavefront_.release();
+            form_ = EyeFormChoice(EyeForm::paths);
+        }
+    }
+
+    bool run_eye_pass(const EyePass& eye, const std::atomic<bool>& stop) {
+        using Clock = std::chrono::steady_clock;
+        const bool timed = form_.is_open();
+        if (timed) wait_for(Queue::passes);
+        const auto start = Clock::now();
+        counters.eye_form = form_.next();
+        const bool went_on = pass_.guides ? run_eye_pass<GuidedSink>(eye, GuidedEyePass{eye}, stop)
+                                          : run_eye_pass<PixelSink>(eye, eye, stop);
+        if (!went_on || !timed) return went_on;
+        wait_for(Queue::passes);
+        form_.took(std::chrono::duration<double>(Clock::now() - start).count());
+        return true;
+    }
+    template <typename Sink, typename Paths>
+    bool run_eye_pass(const EyePass& eye, const Paths& paths, const std::atomic<bool>& stop) {
+        if (form_.next() == EyeForm::paths) return launch_in_batches(pixels(), paths, stop);
+        const uint32_t before = counters.work_done;
+        const auto tell = [&](uint64_t samples) {
+            counters.work_done = before + static_cast<uint32_t>(std::min<uint64_t>(samples, pixels()));
+        };
+        if (!wavefront_.template run<Sink>(eye, stop, tell)) return false;
+        tell(pixels());
+        return true;
     }
 
     bool run_light_pass(uint32_t iteration, const std::atomic<bool>& stop) {
@@ -322,6 +358,8 @@ private:
     Buffer<PixelMoments> moments_;  // this and the next: where sampling is adaptive
     Buffer<int8_t> levels_;
     Buffer<float> variance_, variance_here_;
+    EyeFormChoice form_;
+    Wavefront<Device> wavefront_{device_};
     typename Device::Event finished_{device_}, downloaded_{device_};
     std::array<typename Device::Event, 2> batches_{typename Device::Event{device_}, typename Device::Event{device_}};
     uint32_t next_batch_ = 0;

@@ -99,16 +99,20 @@ struct EyePass {
     GuideSample* guides;  // null without GuidedSink
     PassCounts* counts;
 
-    template <typename Sink>
-    VLP_HD void trace(uint32_t pixel) const {
-        const PixelTurn turn = turn_of(rates, pixel);
-        if (turn.samples == 0) return;
-        const uint32_t x = window.x + pixel % window.width, y = window.y + pixel / window.width;
-        const LightVertexCache cache{slots, stored, slots ? static_cast<uint32_t>(counts->stored_vlps) : 0};
-        const PixelResult result = trace_pixel<Sink>(scene, pass, cache, turn, x, y);
+    VLP_HD uint32_t x_of(uint32_t pixel) const { return window.x + pixel % window.width; }
+    VLP_HD uint32_t y_of(uint32_t pixel) const { return window.y + pixel / window.width; }
+    VLP_HD LightVertexCache cache() const {
+        return {slots, stored, slots ? static_cast<uint32_t>(counts->stored_vlps) : 0};
+    }
+    VLP_HD void keep(uint32_t pixel, const PixelResult& result) const {
         if (result.dropped > 0) AtomicAdd{}(counts->dropped, result.dropped);
         frame[pixel] = result.found;
         if (guides) guides[pixel] = result.guide;
+    }
+    template <typename Sink>
+    VLP_HD void trace(uint32_t pixel) const {
+        const PixelTurn turn = turn_of(rates, pixel);
+        if (turn.samples > 0) keep(pixel, trace_pixel<Sink>(scene, pass, cache(), turn, x_of(pixel), y_of(pixel)));
     }
     VLP_HD void operator()(uint32_t pixel) const { trace<PixelSink>(pixel); }
 };

@@ -2,7 +2,7 @@
 #include "backend/memory.h"
 
 #include "backend/backend.h"
-#include "backend/gpu_kernels.h"
+#include "backend/wavefront_kernels.h"
 
 namespace vlp {
 
@@ -31,6 +31,11 @@ void add_gpu_memory(MemoryByDevice& memory, const Scene& scene, const PassSettin
         gpu.light_vertices += light_vertex_capacity(pass) * (sizeof(LightVertex) + sizeof(VlpCandidate));
         const size_t groups = ListingRuns(pass.light_paths).table();
         gpu.work += pass.light_paths * sizeof(uint8_t) + groups * sizeof(uint32_t) + scan_bytes(groups);
+    }
+    if (forced_eye_form() != EyeForm::paths) {
+        const WavefrontSize size(pass, scene.window().pixel_count());
+        gpu.work += size.bytes();
+        memory["CPU"].work += size.bytes_on_host();
     }
     // The sums come to the host through memory that stays in its place.
     memory["CPU"].film += scene.window().pixel_count() * film_channels(pass) * sizeof(ExactSum);

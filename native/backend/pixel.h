@@ -16,16 +16,16 @@ struct PixelResult {
     uint32_t dropped = 0;  // estimates that were not finite, in all
 };
 
-VLP_HD inline void add_share(PixelResult& sum, const PixelSink& sink, float alpha, float share) {
-    const Rgb found = sink.radiance * share;
+VLP_HD inline void add_share(PixelResult& sum, const PathFinds& finds, float alpha, float share) {
+    const Rgb found = finds.radiance * share;
     sum.found.rgba[0] += found.r, sum.found.rgba[1] += found.g, sum.found.rgba[2] += found.b;
     sum.found.rgba[3] += alpha * share;
-    sum.dropped += sink.dropped;
+    sum.dropped += finds.dropped;
 }
 
-VLP_HD inline void add_share(PixelResult& sum, const GuidedSink& sink, float alpha, float share) {
-    add_share(sum, sink.pixel, alpha, share);
-    const GuideSample guide = sink.guide();
+VLP_HD inline void add_share(PixelResult& sum, const GuidedFinds& finds, float alpha, float share) {
+    add_share(sum, finds.path, alpha, share);
+    const GuideSample guide = finds.guide();
     for (int c = 0; c < 3; ++c) {
         sum.guide.albedo[c] += guide.albedo[c] * share;
         sum.guide.normal[c] += guide.normal[c] * share;
@@ -41,7 +41,7 @@ VLP_HD inline PixelResult trace_pixel(const SceneView& scene, const PassSettings
     for (uint32_t i = 0; i < turn.samples; ++i) {
         Sink sink(pass, scene);
         const float alpha = trace_eye_path(scene, pass, cache, {turn.sequence, turn.first_index + i}, x, y, sink);
-        add_share(mean, sink, alpha, share);
+        add_share(mean, sink.finds, alpha, share);
     }
     return mean;
 }

@@ -224,6 +224,7 @@ void bind_renderer(nb::module_& m) {
         .def_prop_ro("iterations", &Renderer::iteration_count)
         .def_prop_ro("vlps", [](const Renderer& r) { return r.stored_vlps(); })
         .def_prop_ro("dropped", [](const Renderer& r) { return r.dropped(); })
+        .def_prop_ro("eye_form", [](const Renderer& r) { return k_eye_form_names[static_cast<size_t>(r.eye_form())]; })
         .def_prop_ro("eye_samples", [](const Renderer& r) { return r.eye_samples(); })
         .def_prop_ro("light_paths", &traced_light_paths)
         .def_prop_ro("paths",

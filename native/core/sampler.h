@@ -77,8 +77,6 @@ struct Sampler {
         const SamplePair pair = next_pair();
         return {unit_float(pair.x), unit_float(pair.y)};
     }
-
-private:
     VLP_HD SamplePair next_pair() {
         const uint32_t d = dimension++;
         if constexpr (VLP_ON_DEVICE) return sample_pair(seed, index, d);
@@ -86,6 +84,7 @@ private:
         return {x_[d % k_block], y_[d % k_block]};
     }
 
+private:
     VLP_HD void compute_block(uint32_t block) {
         block_ = block;
         for (uint32_t i = 0; i < k_block; ++i) {

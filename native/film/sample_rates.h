@@ -97,7 +97,9 @@ private:
 };
 
 // The cheapest levels for these deviations of one sample, one sample a pixel on average: as many samples as deviate, by
-// Neyman's rule, within the bounds of levels.
+// Neyman's rule, within the bounds of levels. The levels below 0 may all fall on one turn: no iteration takes more than
+// k_most_samples_a_pixel on average.
+inline constexpr uint32_t k_most_samples_a_pixel = 2;
 std::vector<int8_t> levels_for(std::span<const float> deviation);
 
 }  // namespace vlp

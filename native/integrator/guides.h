@@ -39,48 +39,61 @@ VLP_HD inline bool is_sharp(const Bsdf& bsdf) {
     return bsdf.count > 0;
 }
 
-// Sums up a pixel's path as PixelSink does, and its guides. Their means over many paths are what counts: of a single one
-// the albedo may exceed 1, as throughputs do.
-struct GuidedSink {
-    PixelSink pixel;
-    const SceneView& scene;
+// Of a single path the albedo may exceed 1, as throughputs do: means over many are what counts.
+struct GuidedFinds {
+    PathFinds path;
     Rgb albedo{};
     Vec3 normal{};
-    const EyeWalk* eye = nullptr;  // once it has left the lens
     bool open = true;  // nothing blurred so far
     bool sharp = false;  // the walk's last surface has sharp lobes alone
-
-    VLP_HD GuidedSink(const PassSettings& settings, const SceneView& view) : pixel(settings, view), scene(view) {}
-
-    VLP_HD void add(const Contribution& c) {
-        pixel.add(c);
-        if (c.s != 0 || (eye != nullptr && !sees(eye->t + 1))) return;
-        const Rgb most = eye != nullptr ? eye->throughput : rgb(1);
-        albedo += {min_of(c.value.r, most.r), min_of(c.value.g, most.g), min_of(c.value.b, most.b)};
-    }
-    VLP_HD void visit(const EyeWalk& walk) {
-        eye = &walk;
-        open = sees(walk.t);
-        if (!open) return;
-        const Bsdf bsdf = make_bsdf(scene, walk.surface);
-        sharp = is_sharp(bsdf);
-        normal = sharp ? Vec3{} : face_toward(bsdf.normal, walk.w_eye);
-        if (sharp) return;
-        const float cos_eye = dot(walk.w_eye, bsdf.normal);
-        for (uint32_t i = 0; i < bsdf.count; ++i) {
-            const Lobe& lobe = bsdf.lobes[i];
-            if (!is_specular(lobe)) albedo += walk.throughput * lobe_albedo(bsdf, lobe, cos_eye);
-        }
-    }
 
     VLP_HD GuideSample guide() const {
         const bool finite = is_finite(albedo) && is_finite(normal);
         return finite ? GuideSample{{albedo.r, albedo.g, albedo.b}, {normal.x, normal.y, normal.z}} : GuideSample{};
     }
+};
+
+// Sums up a pixel's path as PixelSink does, and its guides.
+struct GuidedSink {
+    using Finds = GuidedFinds;
+
+    const PassSettings& pass;
+    const SceneView& scene;
+    Finds finds{};
+    const EyeWalk* eye = nullptr;  // once it has left the lens
+
+    VLP_HD GuidedSink(const PassSettings& settings, const SceneView& view) : pass(settings), scene(view) {}
+    VLP_HD void resume(const Finds& before, const EyeWalk& walk) {
+        finds = before;
+        eye = walk.t > 1 ? &walk : nullptr;
+    }
+
+    VLP_HD void add(const Contribution& c) {
+        finds.path.add(pass, c);
+        if (c.s != 0 || (eye != nullptr && !sees(eye->t + 1))) return;
+        const Rgb most = eye != nullptr ? eye->throughput : rgb(1);
+        finds.albedo += {min_of(c.value.r, most.r), min_of(c.value.g, most.g), min_of(c.value.b, most.b)};
+    }
+    VLP_HD void visit(const EyeWalk& walk) {
+        eye = &walk;
+        finds.open = sees(walk.t);
+        if (!finds.open) return;
+        const Bsdf bsdf = make_bsdf(scene, walk.surface);
+        finds.sharp = is_sharp(bsdf);
+        finds.normal = finds.sharp ? Vec3{} : face_toward(bsdf.normal, walk.w_eye);
+        if (finds.sharp) return;
+        const float cos_eye = dot(walk.w_eye, bsdf.normal);
+        for (uint32_t i = 0; i < bsdf.count; ++i) {
+            const Lobe& lobe = bsdf.lobes[i];
+            if (!is_specular(lobe)) finds.albedo += walk.throughput * lobe_albedo(bsdf, lobe, cos_eye);
+        }
+    }
 
 private:
     // Whether vertex z_{t-1} is reached without blur.
-    VLP_HD bool sees(uint32_t t) const { return open && (t == 2 || eye->vertices[t - 2].specular || sharp); }
+    VLP_HD bool sees(uint32_t t) const {
+        return finds.open && (t == 2 || eye->vertices[t - 2].specular || finds.sharp);
+    }
 };
 
 }  // namespace vlp

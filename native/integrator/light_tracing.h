@@ -41,10 +41,10 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
 
     for (uint32_t i = 1; i <= pass.light_path_length; ++i) {
         const uint32_t key = hash(seed ^ path, k_transparency_stream, i);
-        const Step step = walk(scene, ray, from.id, false, key, NoLights{});
-        if (!step.found) break;
-        throughput *= step.throughput;
-        const SurfacePoint& y = step.surface;
+        Way way{ray, from.id};
+        SurfacePoint y;
+        if (!walk(scene, false, key, NoLights{}, way, y)) break;
+        throughput *= way.throughput;
         const Edge edge = edge_between(y.position, previous_position);
         const float cos_here = abs_dot(y.geometric_normal, ray.direction);
 

@@ -7,9 +7,11 @@
 
 namespace vlp {
 
-// Next event at z_{t-1}: one of the S samples of a light (strategy s = 1).
+// Next event at z_{t-1}: one of the S samples of a light (strategy s = 1), of which it brings its share. `see(ShadowRay)`
+// tells the transmittance.
+template <typename See>
 VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye,
-                                        const Bsdf& bsdf, uint32_t u_light, Vec2 u) {
+                                        const Bsdf& bsdf, uint32_t u_light, Vec2 u, See& see) {
     Contribution found{.s = 1, .t = eye.t};
     const SurfacePoint& x_1 = eye.surface;
     const DiscreteSample choice = choose_light(scene, x_1, u_light);
@@ -24,14 +26,13 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
     const LobeValue at_x_1 = evaluate(bsdf, eye.w_eye, event.direction);
     if (!(cos_x_1 > 0) || is_black(at_x_1.f)) return found;
 
-    const Anchor from = anchor_of(x_1);
+    const Anchor from = anchor_of(x_1), to{event.position, event.normal, event.surface};
     const Rgb through =
-        is_infinite(light)
-            ? transmittance(scene, Ray{leave(from, event.direction), event.direction}, from.id, {})
-            : transmittance(scene, from, Anchor{event.position, event.normal, event.surface}, event.direction);
+        see(is_infinite(light) ? shadow_ray(from, event.direction) : shadow_ray(from, to, event.direction));
     if (is_black(through)) return found;
     const float pdf_next_event = choice.pdf * event.pdf_solid_angle;
-    found.value = eye.throughput * at_x_1.f * event.radiance * through * (cos_x_1 / pdf_next_event);
+    const float share = 1.0f / static_cast<float>(pass.light_samples);
+    found.value = eye.throughput * at_x_1.f * event.radiance * (cos_x_1 / pdf_next_event * share) * through;
 
     const uint32_t n = eye.t + 1;
     const float dist_squared = event.distance * event.distance;

@@ -33,7 +33,7 @@ VLP_HD inline void connect_to_lens(const SceneView& scene, const PassSettings& p
     // The eye walk begins at the near clip plane.
     const float to_clip = camera.clip_start / cosine_to_view(camera, seen.direction);
     const Anchor near_end{seen.lens + seen.direction * to_clip, {}, {}};
-    const Rgb through = transmittance(scene, anchor_of(point), near_end, to_lens, true);
+    const Rgb through = transmittance(scene, shadow_ray(anchor_of(point), near_end, to_lens), true);
     if (is_black(through)) return;
 
     // The density of an eye walk making z_1 here, over one pixel.

@@ -10,7 +10,7 @@
 namespace vlp {
 
 // Most transparent surfaces that one edge may cross; what lies behind more of them is dark.
-inline constexpr int k_max_transparent = 128;
+inline constexpr uint32_t k_max_transparent = 128;
 
 // The searches of the tree, of which every place that sends a ray shares one stack on a device. Devices have compressed
 // nodes alone, and so does a host that stands in for one.
@@ -45,12 +45,16 @@ VLP_HD inline Vec3 leave(const Anchor& from, Vec3 direction) {
     return offset_origin(from.position, face_toward(from.normal, direction));
 }
 
-// A step of a walk: the surface found, and what transparency along it did to the throughput.
-struct Step {
-    bool found = false;
-    SurfacePoint surface;
+// The way of a walk to its next vertex: the ray from where it has come to, and what was passed through.
+struct Way {
+    Ray ray;
+    PrimitiveId skip;
+    uint32_t passed = 0;  // surfaces
     Rgb throughput = rgb(1);
 };
+
+// What stands at the end of a stretch of the way: a surface that is not passed through, or not.
+enum class Met : uint8_t { nothing, surface, passage };
 
 // A walk that looks for no light on its way.
 struct NoLights {
@@ -58,41 +62,44 @@ struct NoLights {
     VLP_HD void on_surface(const SurfacePoint&, Rgb) const {}
 };
 
-// Follows a ray to the next surface that is not passed through. Whether a partly transparent surface is passed is decided
-// at random from `key`, so passing is no scattering: such a surface is no vertex of the path. `lights.on_stretch(ray,
-// throughput)` is called for each free stretch of the way, whose t_max is where it ends, and `lights.on_surface` for each
-// surface that is met, passed or not.
+// Takes a walk to the `hit` that find_closest found along its way, which becomes `surface`. Whether a partly transparent
+// surface is passed is decided at random from `key`, so passing is no scattering: such a surface is no vertex of the path,
+// and the way goes on behind it. `lights.on_stretch(ray, throughput)` is called for each free stretch of the way, whose
+// t_max is where it ends, and `lights.on_surface` for each surface that is met, passed or not.
 template <typename Lights>
-VLP_HD VLP_FORCE_INLINE Step walk(const SceneView& scene, Ray ray, PrimitiveId skip, bool from_camera, uint32_t key,
-                                  const Lights& lights) {
-    Step step;
-    const float t_end = ray.t_max;
-    float travelled = 0;
-    for (int i = 0; i < k_max_transparent; ++i) {
-        const Hit hit = find_closest(scene, ray, skip);
-        Ray stretch = ray;
-        if (hit.found()) stretch.t_max = hit.t;
-        lights.on_stretch(stretch, step.throughput);
-        if (!hit.found()) return step;
-        step.surface = surface_at(scene, ray, hit);
-        if (!from_camera || (scene.instances[hit.instance].visibility & k_visible_to_camera)) {
-            lights.on_surface(step.surface, step.throughput);
-            const Material& material = scene.materials[step.surface.material];
-            step.found =
-                material.pass_through <= 0 || unit_float(hash(key, static_cast<uint32_t>(i))) >= material.pass_through;
-            if (step.found) {
-                step.throughput *= 1.0f / (1.0f - material.pass_through);
-                return step;
-            }
-            step.throughput *= material.transparency * (1.0f / material.pass_through);
+VLP_HD VLP_FORCE_INLINE Met meet(const SceneView& scene, const Hit& hit, bool from_camera, uint32_t key,
+                                 const Lights& lights, Way& way, SurfacePoint& surface) {
+    Ray stretch = way.ray;
+    if (hit.found()) stretch.t_max = hit.t;
+    lights.on_stretch(stretch, way.throughput);
+    if (!hit.found()) return Met::nothing;
+    surface = surface_at(scene, way.ray, hit);
+    if (!from_camera || (scene.instances[hit.instance].visibility & k_visible_to_camera)) {
+        lights.on_surface(surface, way.throughput);
+        const Material& material = scene.materials[surface.material];
+        if (material.pass_through <= 0 || unit_float(hash(key, way.passed)) >= material.pass_through) {
+            way.throughput *= 1.0f / (1.0f - material.pass_through);
+            return Met::surface;
         }
-        travelled += hit.t;
-        ray.origin = leave(anchor_of(step.surface), ray.direction);
-        ray.t_max = t_end - travelled;
-        skip = {hit.instance, hit.primitive};
+        way.throughput *= material.transparency * (1.0f / material.pass_through);
     }
-    step.throughput = {};
-    return step;
+    way.ray.origin = leave(anchor_of(surface), way.ray.direction);
+    way.ray.t_max -= hit.t;
+    way.skip = {hit.instance, hit.primitive};
+    if (++way.passed < k_max_transparent) return Met::passage;
+    way.throughput = {};
+    return Met::nothing;
+}
+
+// Follows a way to the next surface that is not passed through; false where there is none.
+template <typename Lights>
+VLP_HD VLP_FORCE_INLINE bool walk(const SceneView& scene, bool from_camera, uint32_t key, const Lights& lights,
+                                  Way& way, SurfacePoint& surface) {
+    for (;;) {
+        const Hit hit = find_closest(scene, way.ray, way.skip);
+        const Met met = meet(scene, hit, from_camera, key, lights, way, surface);
+        if (met != Met::passage) return met == Met::surface;
+    }
 }
 
 namespace detail {
@@ -102,7 +109,7 @@ VLP_HD inline Rgb transmittance_of_surfaces(const SceneView& scene, Ray ray, Pri
                                             bool to_camera) {
     Rgb through = rgb(1);
     PrimitiveId skip = from;
-    for (int i = 0; i < k_max_transparent; ++i) {
+    for (uint32_t i = 0; i < k_max_transparent; ++i) {
         const Hit hit = find_closest(scene, ray, skip);
         if (!hit.found() ||
             (hit.instance == to.instance && hit.primitive == to.primitive && hit.t > 0.999f * ray.t_max)) {
@@ -143,13 +150,25 @@ VLP_HD inline Edge edge_between(Vec3 from, Vec3 to) {
     return {d * (1.0f / std::sqrt(dist_squared)), dist_squared};
 }
 
-// Transmittance between two points; their surfaces do not block.
-VLP_HD inline Rgb transmittance(const SceneView& scene, const Anchor& from, const Anchor& to, Vec3 direction,
-                                bool to_camera = false) {
+// The ray of a connection, between the surfaces of its ends, which do not block it.
+struct ShadowRay {
+    Ray ray;
+    PrimitiveId from, to;
+};
+
+VLP_HD inline ShadowRay shadow_ray(const Anchor& from, const Anchor& to, Vec3 direction) {
     const Vec3 origin = leave(from, direction), target = leave(to, -direction);
     const Vec3 d = target - origin;
     const float distance = length(d);
-    return transmittance(scene, {origin, d * (1.0f / distance), distance}, from.id, to.id, to_camera);
+    return {{origin, d * (1.0f / distance), distance}, from.id, to.id};
+}
+// To a light that is infinitely far away.
+VLP_HD inline ShadowRay shadow_ray(const Anchor& from, Vec3 direction) {
+    return {{leave(from, direction), direction}, from.id, {}};
+}
+
+VLP_HD inline Rgb transmittance(const SceneView& scene, const ShadowRay& shadow, bool to_camera = false) {
+    return transmittance(scene, shadow.ray, shadow.from, shadow.to, to_camera);
 }
 
 }  // namespace vlp

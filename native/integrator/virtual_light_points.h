@@ -9,7 +9,7 @@ namespace vlp {
 
 // An eye walk: its vertices' densities from the lens z_0 on, and where it stands.
 struct EyeWalk {
-    VertexDensity vertices[k_max_walk + 1];
+    VertexDensity* vertices = nullptr;  // K + 1 of whoever traces the walk
     uint32_t t = 1;     // vertices so far, the lens counted
     Rgb throughput = rgb(1);
     SurfacePoint surface;  // z_{t-1}
@@ -99,16 +99,18 @@ VLP_HD inline Receiver make_receiver(const SceneView& scene, const PassSettings&
             detail::share_behind(material), eye.throughput * material.albedo, sum.sum - 1};
 }
 
-// One of the C connections at z_{t-1}: of M candidates, drawn evenly over the V stored VLPs, one is kept in proportion to
-// what it promises, and a ray is sent to that one. The estimate is of what all VLPs of an iteration bring; the caller
-// averages over C.
+// One of the C connections at z_{t-1}, to the VLP that was chosen, by a ray that `see` sends. The estimate is of what all VLPs of
+// an iteration bring, and this is its share of it.
+template <typename See>
 VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, const PassSettings& pass,
                                                        const LightVertexCache& cache, const EyeWalk& eye,
-                                                       const Bsdf& eye_bsdf, VlpChoice choice) {
+                                                       const Bsdf& eye_bsdf, VlpChoice choice, See& see) {
     if (!(choice.stands_for > 0)) return {.t = eye.t};
     VlpConnection joined = join_unshadowed(scene, pass, cache, eye, eye_bsdf, choice);
     if (is_black(joined.found.value)) return joined.found;
-    joined.found.value *= transmittance(scene, anchor_of(eye.surface), joined.vlp, joined.direction);
+    const Rgb through = see(shadow_ray(anchor_of(eye.surface), joined.vlp, joined.direction));
+    joined.found.value *= 1.0f / static_cast<float>(pass.vlp_connections);
+    joined.found.value *= through;
     return joined.found;
 }
 

@@ -157,19 +157,32 @@ VLP_HD inline void promise(const Receiver& to, const VlpCandidate* list, const u
 
 #endif
 
-// Candidate `i` of the M of a connection that draws `u`: one of the V stored VLPs, from the i-th stratum of them.
-VLP_HD inline uint32_t candidate_index(const LightVertexCache& cache, uint32_t candidates, uint32_t i, uint32_t u) {
-    const uint64_t stratum = ((static_cast<uint64_t>(i) << 32) + u) / candidates;
-    return static_cast<uint32_t>((stratum * cache.stored_count) >> 32);
-}
+// The M candidates of a connection that draws `u`, one after the other: one of the V stored VLPs from each of M strata of the
+// list, number floor((i V + u V / 2^32) / M).
+struct CandidateDraw {
+    uint32_t candidates, index, rest, step, step_rest;
 
-// Asks for the memory of the candidates, which lie anywhere.
-VLP_HD inline void prefetch_candidates([[maybe_unused]] const LightVertexCache& cache,
-                                       [[maybe_unused]] uint32_t candidates, [[maybe_unused]] uint32_t u) {
-#if !VLP_ON_DEVICE
-    for (uint32_t i = 0; i < candidates; ++i) {
-        __builtin_prefetch(cache.stored + candidate_index(cache, candidates, i, u));
+    VLP_HD CandidateDraw(const LightVertexCache& cache, uint32_t m, uint32_t u)
+        : candidates(m), step(cache.stored_count / m), step_rest(cache.stored_count % m) {
+        const auto at = static_cast<uint32_t>((static_cast<uint64_t>(u) * cache.stored_count) >> 32);
+        index = at / m, rest = at % m;
     }
+    VLP_HD uint32_t next() {
+        const uint32_t drawn = index;
+        rest += step_rest;
+        const bool carry = rest >= candidates;
+        index += step + (carry ? 1 : 0);
+        rest -= carry ? candidates : 0;
+        return drawn;
+    }
+};
+
+// Asks for the memory of the candidates that `u.x` draws, which lie anywhere.
+VLP_HD inline void prefetch_candidates([[maybe_unused]] const PassSettings& pass,
+                                       [[maybe_unused]] const LightVertexCache& cache, [[maybe_unused]] SamplePair u) {
+#if !VLP_ON_DEVICE
+    CandidateDraw draw(cache, pass.vlp_candidates, u.x);
+    for (uint32_t i = 0; i < pass.vlp_candidates; ++i) __builtin_prefetch(cache.stored + draw.next());
 #endif
 }
 
@@ -179,22 +192,19 @@ struct VlpChoice {
     float stands_for = 0;
 };
 
-// Of M candidates, from M strata of the list, one in proportion to its promise: `u` draws them and `u_keep` which is kept.
+// Of M candidates, from M strata of the list, one in proportion to its promise: `u.x` draws them and `u.y` which is kept.
 VLP_HD inline VlpChoice choose_virtual_light_point(const PassSettings& pass, const LightVertexCache& cache,
-                                                   const Receiver& receiver, uint32_t u, float u_keep) {
+                                                   const Receiver& receiver, SamplePair u) {
     const uint32_t candidates = pass.vlp_candidates;
-    if (candidates == 1) {
-        return {cache.stored[candidate_index(cache, 1, 0, u)].slot, static_cast<float>(cache.stored_count)};
-    }
+    CandidateDraw draw(cache, candidates, u.x);
+    if (candidates == 1) return {cache.stored[draw.next()].slot, static_cast<float>(cache.stored_count)};
     VlpChoice kept;
-    float kept_promise = 0, sum = 0;
+    float u_keep = unit_float(u.y), kept_promise = 0, sum = 0;
     for (uint32_t first = 0; first < candidates; first += k_candidates_at_once) {
         const uint32_t count = min_of(candidates - first, k_candidates_at_once);
         uint32_t index[k_candidates_at_once];
         float promises[k_candidates_at_once];
-        for (uint32_t i = 0; i < k_candidates_at_once; ++i) {
-            index[i] = candidate_index(cache, candidates, first + min_of(i, count - 1), u);
-        }
+        for (uint32_t i = 0; i < k_candidates_at_once; ++i) index[i] = i < count ? draw.next() : index[0];
         promise(receiver, cache.stored, index, promises);
         float here = 0;
         for (uint32_t i = 0; i < count; ++i) here += promises[i];

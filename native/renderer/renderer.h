@@ -58,6 +58,7 @@ public:
 
     float progress() const;  // of the iteration under way, 0 to 1
     uint32_t stored_vlps() const { return active_.load()->counters.stored_vlps; }
+    EyeForm eye_form() const { return active_.load()->counters.eye_form; }
     uint64_t dropped() const;  // estimates that were not finite
     uint64_t eye_samples() const;  // of complete iterations
     const PassSettings& pass() const { return pass_; }

@@ -136,6 +136,8 @@ class Renderer:
     @property
     def dropped(self) -> int: ...
     @property
+    def eye_form(self) -> str: ...  # "paths" or "wavefront"
+    @property
     def light_paths(self) -> int: ...  # of one iteration; 0 where nothing needs them
     @property
     def paths(self) -> int: ...

@@ -52,9 +52,10 @@ class Progress:
 @dataclass(frozen=True)
 class Statistics:
     """What a render did and took. eye_samples and light_paths: in all; memory: bytes by device and part; dropped:
-    non-finite samples left out; build_seconds: uploading the scene and building its hierarchy, as far as it changed;
-    denoise_seconds: of denoising the last picture, not part of seconds; noise: of the picture before denoising, as
-    `vlp_bpt.noise` measures it, None without `noise_threshold` and before it was told."""
+    non-finite samples left out; eye_form: of the eye pass, "paths" or "wavefront" (native/backend/eye_form.h);
+    build_seconds: uploading the scene and building its hierarchy, as far as it changed; denoise_seconds: of denoising
+    the last picture, not part of seconds; noise: of the picture before denoising, as `vlp_bpt.noise` measures it, None
+    without `noise_threshold` and before it was told."""
 
     iterations: int
     seconds: float
@@ -64,6 +65,7 @@ class Statistics:
     vlps: int
     dropped: int
     memory: dict[str, dict[str, int]]
+    eye_form: str = "paths"
     denoise_seconds: float = 0.0
     noise: float | None = None
 
@@ -186,6 +188,7 @@ class Renderer:
             vlps=int(self._native.vlps),
             dropped=int(self._native.dropped),
             memory=self.memory,
+            eye_form=self._native.eye_form,
             denoise_seconds=self._denoise_seconds,
             noise=self._noise.noise,
         )
@@ -326,6 +329,7 @@ class Renderer:
             "ranges": [list(range_) for range_ in sorted(self._native.ranges.items())],
             "seconds": round(self._seconds, 3),
             "seed": self.settings.seed,
+            "eye_form": statistics["eye_form"],
             "film": {"width": self.film.width, "height": self.film.height, "window": list(self.film.render_window)},
             "statistics": {name: statistics[name] for name in ("eye_samples", "light_paths", "dropped")},
         } | ({} if self._noise.noise is None else {"noise": self._noise.noise})

@@ -17,6 +17,8 @@ from vlp_bpt.snapshot import load_snapshot
 
 DEVICE = os.environ.get("VLP_TEST_DEVICE", "CUDA")
 SCENES = ("cornell_box", "sierpinski", "indirect_room")
+FORM = "VLP_BPT_GPU_EYE_PASS"  # names the form of the eye pass; without it the faster one is found out
+FORMS = ("paths", "wavefront")
 
 
 def load(name: str, film: Film | None = None) -> Scene:
@@ -33,6 +35,8 @@ def renderer(scene: Scene, device: str = DEVICE, iterations: int = 4, first: int
     assert made.iterate(iterations) == iterations
     assert not made.warnings
     assert made.statistics.dropped == 0
+    if device == "CUDA" and FORM in os.environ:
+        assert made.statistics.eye_form == os.environ[FORM]
     return made
 
 

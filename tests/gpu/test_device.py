@@ -8,7 +8,7 @@ from threading import Timer
 
 import numpy as np
 import pytest
-from on_device import DEVICE, SCENES, load, picture, renderer
+from on_device import DEVICE, FORM, FORMS, SCENES, load, picture, renderer
 
 from vlp_bpt import Renderer, RenderSettings, denoise, devices
 from vlp_bpt.memory import plan_memory
@@ -22,6 +22,13 @@ MODES = ("PAPER", "BALANCED", "REFERENCE")
 @pytest.fixture(autouse=True, scope="module")
 def _there_is_such_a_device() -> None:
     assert any(device["kind"] == DEVICE for device in devices()), f"there is no device {DEVICE} here"
+
+
+@pytest.fixture(autouse=True, params=FORMS[:1] if DEVICE == "CPU" else FORMS)
+def form(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Every test runs with either form of the eye pass."""
+    monkeypatch.setenv(FORM, request.param)
+    return str(request.param)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -66,6 +73,20 @@ def test_the_same_seed_makes_the_same_bits(mode: str) -> None:
     scene = load("cornell_box")
     first, second = (renderer(scene, mode=mode).film_state() for _ in range(2))
     np.testing.assert_array_equal(first, second)
+
+
+def test_forms_make_the_same_picture_and_the_faster_is_taken(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """But for rounding, which the compiler is free to do elsewhere."""
+    scene = load("indirect_room")
+    one = picture(scene, iterations=16)
+    monkeypatch.delenv(FORM)
+    chosen = renderer(scene, iterations=16)
+    assert chosen.statistics.eye_form in FORMS
+    assert chosen.metadata()["eye_form"] == chosen.statistics.eye_form
+    print(f"{form} and chosen: {chosen.statistics.eye_form}")
+    other = chosen.read()[..., :3].astype(np.float64)
+    size = np.maximum(np.abs(one), 1e-2 * one.mean())
+    assert (np.abs(one - other) > 1e-3 * size).any(axis=-1).mean() < 0.1
 
 
 def test_a_window_is_a_part_of_the_whole() -> None:
@@ -125,6 +146,7 @@ def test_light_paths_are_halved_until_they_fit(monkeypatch: pytest.MonkeyPatch) 
     """With the same random numbers as a render of so many light paths."""
     if DEVICE == "CPU":
         pytest.skip("needs a GPU")
+    monkeypatch.setenv(FORM, "paths")  # a wavefront would make room first
     scene = load("cornell_box")
     settings = RenderSettings.from_dict({"samples": 4, "device": DEVICE, "light_paths": 64_000, "filter": "BOX"})
     asked = Renderer(scene, settings).memory["CUDA"]

@@ -1,12 +1,7 @@
 // The GPU back end's own logic, with the host as its device: buffers, batches, streams, memory that runs out, devices that
-// fail and scenes that change. Pictures are the CPU back end's, bit for bit.
-#include "host_device.h"
-#include "renderer/renderer.h"
-#include "transport_scenes.h"
+// fail and scenes that change. Pictures are the CPU back end's, see gpu_cases.h.
+#include "gpu_cases.h"
 
-#include <gtest/gtest.h>
-
-#include <cstdlib>
 #include <cstring>
 #include <map>
 #include <numeric>
@@ -14,72 +9,12 @@
 namespace vlp::test {
 namespace {
 
-struct NamedPass {
-    const char* name;
-    PassSettings pass;
-
-    friend void PrintTo(const NamedPass& p, std::ostream* out) { *out << p.name; }
-};
-
-PassSettings balanced(uint32_t light_paths = 500) {
-    PassSettings pass;
-    pass.light_path_length = 12, pass.eye_path_length = 16, pass.light_paths = light_paths;
-    pass.splats = pass.roulette = true;
-    return pass;
-}
-
-std::vector<NamedPass> passes() {
-    PassSettings paper;
-    paper.light_paths = 576, paper.weighting = Weighting::uniform;
-    PassSettings splats_alone = balanced();
-    splats_alone.vlp_connections = 0;
-    PassSettings path_tracing = splats_alone;
-    path_tracing.splats = false;
-    PassSettings many = balanced();
-    many.light_path_length = many.eye_path_length = k_max_walk;
-    many.vlp_connections = 2, many.vlp_candidates = 3, many.light_samples = 0;
-    PassSettings guided = balanced(), guided_alone = path_tracing;
-    guided.guides = guided_alone.guides = true;
-    return {{"paper", paper},
-            {"guided", guided},
-            {"guided_path_tracing", guided_alone},
-            {"balanced", balanced()},
-            {"splats_alone", splats_alone},
-            {"path_tracing", path_tracing},
-            {"many", many}};
-}
-
-std::shared_ptr<Scene> room(uint32_t pixels = 24) { return crowded_room(every_light().back().add, pixels); }
-
-// The sums of iterations [0, count) by the CPU.
-std::vector<ExactSum> cpu_sums(const Scene& scene, const PassSettings& pass, uint32_t count) {
-    const auto cpu = make_cpu_backend(scene, pass, 1);
-    Film film(scene.window(), pass.splats, pass.guides);
-    const std::atomic<bool> go_on{false};
-    for (uint32_t i = 0; i < count; ++i) EXPECT_TRUE(cpu->run_iteration(i, film, go_on));
-    return {film.sums().begin(), film.sums().end()};
-}
-
-void expect_same_sums(std::span<const ExactSum> a, std::span<const ExactSum> b) {
-    ASSERT_EQ(a.size(), b.size());
-    size_t differing = 0;
-    for (size_t i = 0; i < a.size(); ++i) differing += a[i].fraction != b[i].fraction || a[i].whole != b[i].whole;
-    EXPECT_EQ(differing, 0u) << "of " << a.size();
-}
-
-// Limits what all devices together may take, while it lives.
-struct MemoryLimit {
-    explicit MemoryLimit(size_t bytes) { setenv("VLP_BPT_GPU_MEMORY", std::to_string(bytes).c_str(), 1); }
-    ~MemoryLimit() { unsetenv("VLP_BPT_GPU_MEMORY"); }
-    MemoryLimit(const MemoryLimit&) = delete;
-    MemoryLimit& operator=(const MemoryLimit&) = delete;
-};
-
-class GpuPasses : public testing::TestWithParam<NamedPass> {};
+class GpuPasses : public testing::TestWithParam<std::tuple<NamedPass, const char*>> {};
 
 TEST_P(GpuPasses, MakeTheCpusSums) {
     const auto scene = room();
-    const PassSettings pass = for_scene(scene->view(), GetParam().pass);
+    const PassSettings pass = for_scene(scene->view(), std::get<0>(GetParam()).pass);
+    const FormOfEyePasses form(std::get<1>(GetParam()));
     const std::vector<ExactSum> expected = cpu_sums(*scene, pass, 5);
     EXPECT_GT(expected[4 * (12 * 24 + 12)].value(), 0);
     for (const Eager eager : {Eager::none, Eager::passes, Eager::copies}) {
@@ -104,13 +39,17 @@ TEST_P(GpuPasses, MakeTheCpusSums) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, GpuPasses, testing::ValuesIn(passes()),
-                         [](const auto& chosen) { return std::string(chosen.param.name); });
+INSTANTIATE_TEST_SUITE_P(All, GpuPasses, testing::Combine(testing::ValuesIn(passes()), testing::ValuesIn(k_forms)),
+                         [](const auto& chosen) {
+                             const std::string form = std::get<1>(chosen.param);
+                             return std::get<0>(chosen.param).name + ("_" + (form.empty() ? "chosen" : form));
+                         });
 
 // Over three plans, of which the device is told each; the block between them is interrupted.
 TEST(GpuBackend, SamplesAdaptAsOnTheCpu) {
     const auto scene = room();
-    for (const bool guides : {false, true}) {
+    for (const auto& [guides, name] : {std::pair{false, "paths"}, {false, "wavefront"}, {true, ""}}) {
+        const FormOfEyePasses form(name);
         PassSettings asked = balanced();
         asked.adaptive = true, asked.guides = guides;
         const PassSettings pass = for_scene(scene->view(), asked);
@@ -164,38 +103,57 @@ TEST(GpuBackend, BatchesAreBounded) {
     pass.light_paths = 300'000, pass.eye_path_length = 1;
     pass = for_scene(scene.view(), pass);
     ASSERT_GT(pass.kappa, 0);
-    HostMachine machine;
-    HostBackend gpu(scene, pass, machine);
-    Film film(scene.window());
-    for (uint32_t i = 0; i < 2; ++i) EXPECT_TRUE(gpu.run_iteration(i, film, false));
-    gpu.collect(film);
-    EXPECT_LE(machine.most_in_one_launch, size_t{4} * 700 * 600);  // adding to the sums
-    EXPECT_LE(machine.most_queued_launches, 5u);  // two batches, and the short ones between
-    expect_same_sums(film.sums(), cpu_sums(scene, pass, 2));
+    const std::vector<ExactSum> expected = cpu_sums(scene, pass, 2);
+    for (const auto& [name, queued] : {std::pair{"paths", 5u}, {"wavefront", 32u}}) {  // two batches or rounds, and
+        const FormOfEyePasses form(name);  // the short ones between
+        HostMachine machine;
+        HostBackend gpu(scene, pass, machine);
+        Film film(scene.window());
+        for (uint32_t i = 0; i < 2; ++i) EXPECT_TRUE(gpu.run_iteration(i, film, false));
+        gpu.collect(film);
+        EXPECT_LE(machine.most_in_one_launch, size_t{4} * 700 * 600);  // adding to the sums
+        EXPECT_LE(machine.most_queued_launches, queued) << name;
+        expect_same_sums(film.sums(), expected);
+    }
 }
 
 TEST(GpuBackend, WhatIsStoppedLeavesTheSumsAsTheyWere) {
-    const auto scene = room();
-    const PassSettings pass = for_scene(scene->view(), balanced());
-    HostMachine machine;
-    HostBackend gpu(*scene, pass, machine);
-    Film film(scene->window(), pass.splats);
-    EXPECT_TRUE(gpu.run_iteration(0, film, false));
-    EXPECT_FALSE(gpu.run_iteration(1, film, true));
-    // Stopped within: the first time the flag is read it is not set yet.
-    std::atomic<bool> stop{false};
-    machine.on_launch = [&] { stop = true; };
-    EXPECT_FALSE(gpu.run_iteration(1, film, stop));
-    machine.on_launch = {};
-    EXPECT_EQ(gpu.kept(), 1u);
-    EXPECT_TRUE(gpu.run_iteration(1, film, false));
-    gpu.collect(film);
-    expect_same_sums(film.sums(), cpu_sums(*scene, pass, 2));
+    const auto scene = room(8);
+    const PassSettings pass = for_scene(scene->view(), balanced(40));
+    const std::vector<ExactSum> expected = cpu_sums(*scene, pass, 2);
+    for (const char* name : k_forms) {
+        const FormOfEyePasses form(name);
+        HostMachine machine;
+        HostBackend gpu(*scene, pass, machine);
+        Film film(scene->window(), pass.splats);
+        EXPECT_TRUE(gpu.run_iteration(0, film, false));
+        EXPECT_FALSE(gpu.run_iteration(1, film, true));
+        // Stopped at each launch in turn: the first time the flag is read it is not set yet.
+        std::atomic<bool> stop{false};
+        bool done = false;
+        for (int launches = 1; !done; ++launches) {
+            stop = false;
+            machine.on_launch = [&, left = launches]() mutable {
+                if (--left == 0) stop = true;
+            };
+            EXPECT_EQ(gpu.kept(), 1u);
+            done = gpu.run_iteration(1, film, stop);
+            EXPECT_TRUE(done || stop);
+        }
+        machine.on_launch = {};
+        EXPECT_EQ(gpu.kept(), 2u);
+        gpu.collect(film);
+        expect_same_sums(film.sums(), expected);
+    }
 }
 
 TEST(GpuBackend, TakesTheMemoryThatWasPlanned) {
     const auto scene = room();
-    for (const NamedPass& named : passes()) {
+    std::vector<NamedPass> all = passes();
+    all.push_back({"adaptive", balanced()});
+    all.back().pass.adaptive = true;
+    for (const NamedPass& named : all) {
+        const FormOfEyePasses form(named.pass.guides ? "paths" : "");
         const PassSettings pass = for_scene(scene->view(), named.pass);
         HostMachine machine;
         MemoryByDevice plan, taken;
@@ -225,23 +183,8 @@ TEST(CpuBackend, TakesTheMemoryThatWasPlanned) {
     }
 }
 
-// With the GPU of this process being the host.
-struct GpuRender {
-    explicit GpuRender(std::shared_ptr<Scene> scene, const PassSettings& asked, const std::string& device = "CUDA")
-        : pass(for_scene(scene->view(), asked)) {
-        const MakeBackend make_gpu = [this](const Scene& of, const PassSettings& with) {
-            return std::make_unique<HostBackend>(of, with, machine);
-        };
-        Devices devices = make_devices(device, *scene, pass, 1, make_gpu);
-        renderer = std::make_unique<Renderer>(scene, pass, scene->window(), std::move(devices), 0, 1000);
-    }
-
-    HostMachine machine;
-    PassSettings pass;
-    std::unique_ptr<Renderer> renderer;
-};
-
 TEST(GpuMemory, LightPathsAreHalvedUntilTheyFit) {
+    const FormOfEyePasses form("paths");
     const auto scene = room();
     const PassSettings asked = for_scene(scene->view(), balanced(4000));
     MemoryByDevice plan;
@@ -261,6 +204,7 @@ TEST(GpuMemory, LightPathsAreHalvedUntilTheyFit) {
 
 // Two devices must render the same estimator.
 TEST(GpuMemory, TheHelperHasAsManyLightPaths) {
+    const FormOfEyePasses form("paths");
     const auto scene = room();
     const PassSettings asked = for_scene(scene->view(), balanced(4000));
     MemoryByDevice plan;
@@ -292,18 +236,28 @@ TEST(GpuMemory, WithoutRoomForTheSceneTheCpuRenders) {
 }
 
 TEST(GpuFailure, InAPassKeepsWhatIsRendered) {
-    const auto scene = room();
-    for (int launches = 0; launches < 7 * 4; ++launches) {  // any of those of 7 iterations
-        GpuRender render(scene, balanced());
-        render.machine.launches_until_failure = launches;
-        EXPECT_EQ(render.renderer->iterate(3), 3u);
-        EXPECT_EQ(render.renderer->iterate(4), 4u);
-        EXPECT_EQ(render.renderer->settle(), 0);
-        EXPECT_EQ(render.renderer->iterations().finished(), (std::map<uint32_t, uint32_t>{{0, 7}}));
-        EXPECT_EQ(render.renderer->film().iterations(), 7u);
-        ASSERT_EQ(render.renderer->notes().size(), 1u);
-        EXPECT_EQ(render.renderer->notes()[0], "device HOST: the passes: lost; going on with the CPU");
-        expect_same_sums(render.renderer->film().sums(), cpu_sums(*scene, render.pass, 7));
+    const auto scene = room(8);
+    PassSettings asked = balanced(40);
+    asked.eye_path_length = 3;
+    const std::vector<ExactSum> expected = cpu_sums(*scene, for_scene(scene->view(), asked), 7);
+    for (const char* name : k_forms) {
+        const FormOfEyePasses form(name);
+        bool failed = true;
+        for (int launches = 0; failed; ++launches) {  // any of those of 7 iterations
+            GpuRender render(scene, asked);
+            render.machine.launches_until_failure = launches;
+            EXPECT_EQ(render.renderer->iterate(3), 3u);
+            EXPECT_EQ(render.renderer->iterate(4), 4u);
+            EXPECT_EQ(render.renderer->settle(), 0);
+            EXPECT_EQ(render.renderer->iterations().finished(), (std::map<uint32_t, uint32_t>{{0, 7}}));
+            EXPECT_EQ(render.renderer->film().iterations(), 7u);
+            failed = render.machine.launches_until_failure < 0;
+            ASSERT_EQ(render.renderer->notes().size(), failed ? 1u : 0u);
+            if (failed) {
+                EXPECT_EQ(render.renderer->notes()[0], "device HOST: the passes: lost; going on with the CPU");
+            }
+            expect_same_sums(render.renderer->film().sums(), expected);
+        }
     }
 }
 

@@ -153,8 +153,8 @@ TEST(VlpCandidates, EachIsKeptByItsPromise) {
         constexpr uint32_t k_draws = 200000;
         std::vector<uint32_t> kept(count);
         for (uint32_t i = 0; i < k_draws; ++i) {
-            const float u = (static_cast<float>(i) + 0.5f) / k_draws;
-            const VlpChoice choice = choose_virtual_light_point(pass, crowd.cache, crowd.receiver, 0x80000000u, u);
+            const auto u_keep = static_cast<uint32_t>((i + 0.5) / k_draws * 0x1p32);
+            const VlpChoice choice = choose_virtual_light_point(pass, crowd.cache, crowd.receiver, {1u << 31, u_keep});
             const uint32_t at = choice.slot - 1000;
             ASSERT_LT(at, count);
             ++kept[at];
@@ -174,17 +174,23 @@ TEST(VlpCandidates, WhatPromisesNothingIsNotKept) {
     for (const uint32_t black : {0u, 4u, 6u, 7u}) crowd.list[black].others = k_infinity;
     PassSettings pass;
     pass.vlp_candidates = 8;
-    const VlpChoice choice = choose_virtual_light_point(pass, crowd.cache, crowd.receiver, 0, 0.7f);
+    const VlpChoice choice = choose_virtual_light_point(pass, crowd.cache, crowd.receiver, {0, 0xb0000000u});
     EXPECT_EQ(choice.slot, 1005u);
     EXPECT_EQ(choice.stands_for, 1);
     crowd.list[5].others = std::nanf("");
-    EXPECT_EQ(choose_virtual_light_point(pass, crowd.cache, crowd.receiver, 0, 0.7f).stands_for, 0);
+    EXPECT_EQ(choose_virtual_light_point(pass, crowd.cache, crowd.receiver, {0, 0xb0000000u}).stands_for, 0);
 }
 
 TEST(VlpCandidates, CandidatesAreOfAllStrata) {
     const Crowd crowd(1000);
-    for (const uint32_t u : {0u, 0x80000000u, 0xffffffffu}) {
-        for (uint32_t i = 0; i < 8; ++i) EXPECT_EQ(candidate_index(crowd.cache, 8, i, u) / 125, i);
+    for (const uint32_t m : {1u, 7u, 8u, 1000u, 1024u}) {
+        for (const uint32_t u : {0u, 1u, 0x80000000u, 0xffffffffu}) {
+            CandidateDraw draw(crowd.cache, m, u);
+            for (uint64_t i = 0; i < m; ++i) {
+                const uint64_t at = (uint64_t{u} * 1000) >> 32;
+                ASSERT_EQ(draw.next(), (i * 1000 + at) / m) << i << " of " << m;
+            }
+        }
     }
 }
 
