@@ -103,7 +103,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "N64": {"light_paths": 64},
     "C3": {"vlp_connections": 3},
     "M4": {"vlp_candidates": 4},
-    "C2_M3": {"vlp_connections": 2, "vlp_candidates": 3},
+    "C2_M11": {"vlp_connections": 2, "vlp_candidates": 11},
     "S4": {"light_samples": 4},
     "C3_S4_N64": {"light_paths": 64, "vlp_connections": 3, "light_samples": 4},
     "uniform": {"weighting": "UNIFORM"},
