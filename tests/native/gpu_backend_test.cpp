@@ -189,7 +189,7 @@ TEST(GpuMemory, LightPathsAreHalvedUntilTheyFit) {
     const PassSettings asked = for_scene(scene->view(), balanced(4000));
     MemoryByDevice plan;
     add_gpu_memory(plan, *scene, asked);
-    const MemoryLimit limit(plan["CUDA"].total() - asked.light_paths * size_t{12 * 60} * 2 / 3);
+    const MemoryLimit limit(plan["CUDA"].total() - asked.light_paths * size_t{12 * 96} * 2 / 3);
     GpuRender render(scene, balanced(4000));
     EXPECT_EQ(render.pass.light_paths, 1000u);
     EXPECT_EQ(render.renderer->pass().light_paths, 1000u);

@@ -3,6 +3,7 @@
 
 #include "host_device.h"
 #include "renderer/renderer.h"
+#include "same_sums.h"
 #include "transport_scenes.h"
 
 #include <gtest/gtest.h>
@@ -57,25 +58,12 @@ inline std::vector<ExactSum> cpu_sums(const Scene& scene, const PassSettings& pa
     return {film.sums().begin(), film.sums().end()};
 }
 
-// Pictures are the CPU back end's, bit for bit. Where the compiler fuses products with sums, it does so in other places of
-// a wavefront than of the CPU's function, so that is held of builds that cannot.
-#ifdef __FP_FAST_FMAF
-inline constexpr bool k_fuses = true;
-#else
-inline constexpr bool k_fuses = false;
-#endif
-
+// Pictures of a wavefront are the CPU back end's.
 inline void expect_same_sums(std::span<const ExactSum> a, std::span<const ExactSum> b) {
-    ASSERT_EQ(a.size(), b.size());
-    size_t differing = 0, far = 0;
-    for (size_t i = 0; i < a.size(); ++i) {
-        differing += a[i].fraction != b[i].fraction || a[i].whole != b[i].whole;
-        far += std::abs(a[i].value() - b[i].value()) > 1e-4 * std::abs(b[i].value()) + 1e-9;
-    }
-    if (k_fuses && forced_eye_form() != EyeForm::paths) {
-        EXPECT_LE(far, a.size() / 100) << "of " << a.size();  // where a path has turned off
+    if (forced_eye_form() == EyeForm::paths) {
+        expect_same_bits(a, b);
     } else {
-        EXPECT_EQ(differing, 0u) << "of " << a.size();
+        expect_same_by_other_code(a, b);
     }
 }
 
