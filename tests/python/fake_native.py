@@ -49,6 +49,7 @@ class FakeRenderer:
         self._stop = threading.Event()
         self.notes: list[str] = []
         self.resting = True
+        self.eye_form = "paths"
 
     @property
     def ranges(self) -> dict[int, int]:
@@ -57,6 +58,7 @@ class FakeRenderer:
 
     def rest(self) -> None:
         self.resting = True
+        self.eye_form = "paths"
 
     def iterate(self, count: int) -> int:
         self._stop.clear()

@@ -237,7 +237,7 @@ def test_the_true_error_at_the_stop_is_near_the_threshold(scene: Any, threshold:
 def test_stopping_does_not_bias_the_picture() -> None:
     """t-tests of each pixel, of 4 x 4 blocks and of the whole, false-alarm rate 1e-4 each. Pixels that stop by
     themselves fail the last of them: it would see such a bias."""
-    count, threshold = 400, 0.033
+    count, threshold = 600, 0.026
 
     def luminances(stops: bool, seed: int) -> NDArray[np.float64]:
         renderer = make(threshold if stops else 0, samples=MANY if stops else 40, seed=seed, threads=1)
