@@ -105,7 +105,8 @@ def settings() -> dict[str, str]:
     balanced = MODE_PRESETS[Mode.BALANCED]
     return {
         "VLP-BPT": f"BALANCED: L = {balanced.light_path_length}, K = {balanced.eye_path_length}, roulette, splats, "
-        f"adaptive sampling, one VLP a hit, a light path for {balanced.pixels_per_light_path} pixels; Sobol sequences.",
+        f"adaptive sampling, one VLP of {balanced.vlp_candidates} a hit, a light path for "
+        f"{balanced.pixels_per_light_path} pixels; Sobol sequences.",
         f"Cycles{_version('bpy')}": "path tracing on the CPU, multiple importance sampling; light tree, adaptive "
         "sampling, path guiding, clamps and denoiser off; its Sobol sequences. Spheres are smooth meshes, as its point "
         "clouds are wrong inside glass.",
