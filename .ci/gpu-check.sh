@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# gpu-check.sh: builds the package with CUDA, runs the native tests and tests/gpu, and writes what the benchmarks measure to
-# $OUT/gpu.json, $OUT/gpu_rays.json and $OUT/gpu.md, on a machine that has a GPU, nvcc, CMake, ninja, a C++ compiler and a Python with nanobind, numpy and pytest, and that reaches no
-# package registry. PYTHON and VLP_CUDA_ARCHITECTURES may be set.
+# gpu-check.sh: builds the package with CUDA, runs the native tests and tests/gpu, and writes what the benchmarks
+# measure to $OUT/gpu.json, $OUT/gpu_rays.json and $OUT/gpu.md, on a machine that has a GPU, nvcc, CMake, ninja, a C++
+# compiler and a Python with nanobind, numpy and pytest, and that reaches no package registry. PYTHON and
+# VLP_CUDA_ARCHITECTURES may be set.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 python=$(command -v "${PYTHON:-python3}")

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <string_view>
 
 namespace vlp {
@@ -16,13 +18,14 @@ enum class EyeForm : uint8_t {
 inline constexpr const char* k_eye_form_names[] = {"paths", "wavefront"};
 
 // The form that the environment variable VLP_BPT_GPU_EYE_PASS names, for tests and for the same bits on every run: the
-// forms round in different places.
+// forms round in different places. None where it is empty; throws std::runtime_error for any other name.
 inline std::optional<EyeForm> forced_eye_form() {
     const char* const name = std::getenv("VLP_BPT_GPU_EYE_PASS");
+    if (!name || *name == '\0') return {};
     for (const EyeForm form : {EyeForm::paths, EyeForm::wavefront}) {
-        if (name && std::string_view(name) == k_eye_form_names[static_cast<size_t>(form)]) return form;
+        if (std::string_view(name) == k_eye_form_names[static_cast<size_t>(form)]) return form;
     }
-    return {};
+    throw std::runtime_error(std::string("VLP_BPT_GPU_EYE_PASS='") + name + "': must be paths or wavefront");
 }
 
 // Finds out the faster form by running them in turn: the first iteration warms up, and of the two times that each form has

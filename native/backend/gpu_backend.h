@@ -226,7 +226,7 @@ private:
                 resize(stored_, slots_.size(), "the list of virtual light points");
                 const uint32_t paths = traced ? pass_.light_paths : 0;
                 resize(vertices_in_path_, paths, "counts of light vertices");
-                resize(groups_, traced ? ListingRuns(paths).table() : 0, "counts of virtual light points");
+                resize(groups_, traced ? SortRuns(paths).table(k_vlp_groups) : 0, "counts of virtual light points");
                 resize(scratch_, scan_bytes(groups_.size()), "a scan");
                 start_passes();
                 return;
@@ -317,7 +317,7 @@ private:
 
     // Lists the light vertices that can be connected, by their groups.
     void list_stored() {
-        const ListingRuns runs(pass_.light_paths);
+        const SortRuns runs(pass_.light_paths);
         const CountStored count{scene_, pass_, runs, slots_.data(), vertices_in_path_.data(), groups_.data()};
         device_.clear(groups_.data(), groups_.bytes());
         device_.launch(0, runs.count, count);

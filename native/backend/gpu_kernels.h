@@ -36,22 +36,23 @@ struct LightPass {
 };
 static_assert(k_max_walk <= UINT8_MAX);
 
-// Light paths that are listed by one thread, and how many threads that makes.
-struct ListingRuns {
-    static constexpr uint32_t k_most = 4096, k_least_paths = 32;
-    uint32_t paths, count;
+// A counting sort as in vlp_groups.h, of runs of a list, each by one thread: how many of the list there are in a run, and how
+// many runs.
+struct SortRuns {
+    static constexpr uint32_t k_most = 4096, k_least_length = 32;
+    uint32_t length, count;
 
-    explicit ListingRuns(uint32_t light_paths)
-        : paths(max_of(k_least_paths, (light_paths + k_most - 1) / k_most)), count((light_paths + paths - 1) / paths) {}
-    // The size of the table of vlp_groups.h, with V at its end.
-    size_t table() const { return size_t{k_vlp_groups} * count + 1; }
+    explicit SortRuns(uint32_t all)
+        : length(max_of(k_least_length, (all + k_most - 1) / k_most)), count((all + length - 1) / length) {}
+    // The size of the table: a row for each group, and the number of all at its end.
+    size_t table(uint32_t groups) const { return size_t{groups} * count + 1; }
 };
 
 // Counts the groups of the VLPs of run `run`, a column of `groups`.
 struct CountStored {
     SceneView scene;
     PassSettings pass;
-    ListingRuns runs;
+    SortRuns runs;  // of light paths
     const LightVertex* slots;
     const uint8_t* vertices_in_path;
     uint32_t* groups;
@@ -59,8 +60,8 @@ struct CountStored {
     // visit(begin, end) for the slots of each of its paths.
     template <typename Visit>
     VLP_HD void for_paths(uint32_t run, const Visit& visit) const {
-        const uint32_t end = min_of((run + 1) * runs.paths, pass.light_paths);
-        for (uint32_t path = run * runs.paths; path < end; ++path) {
+        const uint32_t end = min_of((run + 1) * runs.length, pass.light_paths);
+        for (uint32_t path = run * runs.length; path < end; ++path) {
             const uint32_t first = path * pass.light_path_length;
             visit(first, first + vertices_in_path[path]);
         }

@@ -119,9 +119,10 @@ private:
         const CountKinds kinds{round, runs};
         device_.launch(0, paths, FindSurfaces{round});
         device_.launch(0, paths, ArriveAtSurfaces<Sink>{round});
-        device_.clear(groups_.data(), runs.table() * sizeof(uint32_t));
+        device_.clear(groups_.data(), runs.table(k_path_kinds) * sizeof(uint32_t));
         device_.launch(0, runs.count, kinds);
-        device_.scan(groups_.data(), static_cast<uint32_t>(runs.table()), scratch_.data(), scratch_.bytes());
+        device_.scan(groups_.data(), static_cast<uint32_t>(runs.table(k_path_kinds)), scratch_.data(),
+                     scratch_.bytes());
         device_.launch(0, runs.count, SortPaths{kinds});
         device_.launch(0, paths, GatherLight{round});
         device_.launch(0, paths * round.queue.connections_each, SeeConnections{round, paths});

@@ -67,17 +67,6 @@ struct SampleList {
     }
 };
 
-// The paths of a list that are sorted by one thread, and how many threads that makes.
-struct SortRuns {
-    static constexpr uint32_t k_most = 4096, k_least_paths = 32;
-    uint32_t paths, count;
-
-    explicit SortRuns(uint32_t all)
-        : paths(max_of(k_least_paths, (all + k_most - 1) / k_most)), count((all + paths - 1) / paths) {}
-    // The size of the table, a row for each kind as in vlp_groups.h, with the number of all paths at its end.
-    size_t table() const { return size_t{k_path_kinds} * count + 1; }
-};
-
 // How much of everything a pass over `pixels` takes: as many paths at a time as keep a GPU at work, within bounds.
 struct WavefrontSize {
     static constexpr uint32_t k_most_slots = 1u << 18;
@@ -106,7 +95,7 @@ struct WavefrontSize {
     }
     // Of two scans: of the samples of pixels, where they differ, and of the kinds of paths.
     size_t first_samples() const { return samples > pixels ? size_t{pixels} + 1 : 0; }
-    size_t groups() const { return SortRuns(slots).table(); }
+    size_t groups() const { return SortRuns(slots).table(k_path_kinds); }
     size_t scratch_bytes() const { return scan_bytes(max_of(first_samples(), groups())); }
 
     size_t bytes() const {
@@ -230,8 +219,8 @@ struct CountKinds {
     // visit(i, entry) for each of its paths that are not gone, and where the table counts them.
     template <typename Visit>
     VLP_HD void for_paths(uint32_t run, const Visit& visit) const {
-        const uint32_t end = min_of((run + 1) * runs.paths, round.ends_before().all);
-        for (uint32_t i = run * runs.paths; i < end; ++i) {
+        const uint32_t end = min_of((run + 1) * runs.length, round.ends_before().all);
+        for (uint32_t i = run * runs.length; i < end; ++i) {
             const uint8_t kind = round.queue.kinds[i];
             if (kind != k_gone) visit(i, round.queue.groups[size_t{runs.count} * kind + run]);
         }

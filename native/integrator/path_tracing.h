@@ -132,7 +132,9 @@ VLP_HD VLP_FORCE_INLINE void gather(const SceneView& scene, const PassSettings& 
     const Receiver receiver = has_vlps ? make_receiver(scene, pass, eye) : Receiver{};
     const auto choose = [&](uint32_t i) {
         sampler.dimension = draws.connections + i;
-        return choose_virtual_light_point(pass, cache, receiver, sampler.next_pair());
+        const VlpChoice choice = choose_virtual_light_point(pass, cache, receiver, sampler.next_pair());
+        prefetch_virtual_light_point(cache, choice);
+        return choice;
     };
     VlpChoice next = has_vlps ? choose(0) : VlpChoice{};
     sampler.dimension = draws.lights;

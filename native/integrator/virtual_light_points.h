@@ -88,11 +88,21 @@ VLP_HD inline VlpConnection join_unshadowed(const SceneView& scene, const PassSe
     return joined;
 }
 
+// Asks for the memory of the VLP that a connection will read, which lies anywhere: a light sample takes as long as it takes to
+// arrive.
+VLP_HD inline void prefetch_virtual_light_point([[maybe_unused]] const LightVertexCache& cache,
+                                                [[maybe_unused]] VlpChoice choice) {
+#if !VLP_ON_DEVICE
+    __builtin_prefetch(cache.slots + choice.slot);
+    __builtin_prefetch(cache.slots + max_of(choice.slot, 1u) - 1);  // the weights look at the vertices before it
+#endif
+}
+
 // z_{t-1} as VLPs may light it.
 VLP_HD inline Receiver make_receiver(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye) {
     const Material& material = scene.materials[eye.surface.material];
     const float cos_previous = dot(eye.surface.geometric_normal, eye.w_eye);
-    StrategySum sum = strategy_sum(pass, strategy_count(pass, 2));
+    StrategySum sum = sum_of_promises(pass, 2);
     add_longer_light_walks(sum, pass, eye.vertices, eye.t + 2, 3, k_inv_pi / eye.last().pdf_area,
                            std::fabs(cos_previous) * k_inv_pi * eye.last().rev_geometry);
     return {eye.surface.position, eye.surface.geometric_normal * (cos_previous < 0 ? -1.0f : 1.0f),

@@ -24,7 +24,7 @@ namespace detail {
 // How much of light that goes through the surface counts. If nothing goes through, hardly ever a shading normal disagrees.
 VLP_HD inline float share_behind(const Material& material) { return material.transmits ? 1.0f : 1.0f / 64; }
 
-// Two numbers of 16 bits, the upper halves of floats. The first is read with the second's bits as its last ones.
+// Two bfloat16, the upper halves of floats. The first is read with the second's bits as its last ones.
 VLP_HD inline uint32_t pack_halves(float a, float b) {
     return (static_cast<uint32_t>(bits_of(a)) & 0xffff0000u) | static_cast<uint32_t>(bits_of(b)) >> 16;
 }
@@ -33,8 +33,14 @@ VLP_HD inline float second_half(uint32_t halves) { return float_of(static_cast<i
 
 }  // namespace detail
 
+// Promises are weighted by the balance heuristic whatever the weights are: its sums are linear in the densities, so that what
+// is known of either end alone can be summed before they meet.
+VLP_HD inline StrategySum sum_of_promises(const PassSettings& pass, uint32_t s) {
+    return {Weighting::balance, strategy_count(pass, s)};
+}
+
 // The VLP in `slot`. Strategies of fewer light vertices than the connection have, in sum, others * |cos cos| / dist^2 times its
-// density if both surfaces are Lambertian.
+// density if both surfaces are Lambertian; others is in m^2.
 VLP_HD inline VlpCandidate make_candidate(const SceneView& scene, const PassSettings& pass, const LightVertex* slots,
                                           uint32_t slot) {
     const LightVertex& vlp = slots[slot];
@@ -42,7 +48,7 @@ VLP_HD inline VlpCandidate make_candidate(const SceneView& scene, const PassSett
     const Vec3 normal = decode(vlp.geometric_normal);
     const float cos_previous = dot(normal, decode(vlp.to_previous));
     const uint32_t s = vlp.index() + 1;
-    StrategySum sum = strategy_sum(pass, strategy_count(pass, s));
+    StrategySum sum = sum_of_promises(pass, s);
     add_shorter_light_walks(sum, pass, &vlp, s, s + 1, k_inv_pi / vlp.pdf_area,
                             std::fabs(cos_previous) * k_inv_pi * vlp.rev_geometry);
     const Rgb reflected = vlp.throughput * material.albedo;

@@ -181,6 +181,38 @@ TEST(VlpCandidates, WhatPromisesNothingIsNotKept) {
     EXPECT_EQ(choose_virtual_light_point(pass, crowd.cache, crowd.receiver, {0, 0xb0000000u}).stands_for, 0);
 }
 
+// In a scene of 10^12 m densities per area are so small that their squares, which the power heuristic takes, are no numbers.
+TEST(VlpCandidates, PromisesOfHugeScenesAreKept) {
+    Scene scene;
+    add_materials(scene);
+    scene.set_camera({});
+    scene.set_film(1, 1, {0, 0, 1, 1}, false);
+    scene.build(1);
+    LightVertex vlp{};
+    vlp.position = {0, 0, 1e12f};
+    vlp.geometric_normal = vlp.shading_normal = vlp.to_previous = encode({0, 0, -1});
+    vlp.throughput = rgb(1);
+    vlp.pdf_area = 1e-24f, vlp.next_event_ratio = 1;
+    vlp.packed = LightVertex::k_connectible | 1u << LightVertex::k_index_shift | uint32_t{k_white};
+    VertexDensity vertices[2]{};
+    vertices[1].pdf_area = 1e-24f;
+    EyeWalk eye;
+    eye.vertices = vertices, eye.t = 2;
+    eye.surface.position = {}, eye.surface.geometric_normal = eye.surface.shading_normal = {0, 0, 1};
+    eye.surface.material = k_white;
+    eye.w_eye = {0, 0, 1};
+    for (const Weighting weighting : {Weighting::uniform, Weighting::balance, Weighting::power}) {
+        PassSettings pass = many_candidates();
+        pass.weighting = weighting, pass.kappa = 1, pass.vlp_candidates = 2;
+        const VlpCandidate list[2]{make_candidate(scene.view(), pass, &vlp, 0),
+                                   make_candidate(scene.view(), pass, &vlp, 0)};
+        const LightVertexCache cache{&vlp, list, 2};
+        const VlpChoice choice =
+            choose_virtual_light_point(pass, cache, make_receiver(scene.view(), pass, eye), {0, 0});
+        EXPECT_NEAR(choice.stands_for, 2, 1e-5f) << static_cast<int>(weighting);
+    }
+}
+
 TEST(VlpCandidates, CandidatesAreOfAllStrata) {
     const Crowd crowd(1000);
     for (const uint32_t m : {1u, 7u, 8u, 1000u, 1024u}) {

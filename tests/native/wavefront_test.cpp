@@ -46,6 +46,16 @@ TEST(EyeFormChoice, TakesTheFasterForm) {
     }
 }
 
+TEST(EyeFormChoice, AWrongNameIsToldAndTheCpuRenders) {
+    const FormOfEyePasses form("wavefronts");
+    GpuRender render(room(), balanced());
+    ASSERT_EQ(render.renderer->notes().size(), 1u);
+    EXPECT_NE(render.renderer->notes()[0].find("VLP_BPT_GPU_EYE_PASS='wavefronts': must be paths or wavefront"),
+              std::string::npos)
+        << render.renderer->notes()[0];
+    EXPECT_EQ(render.renderer->iterate(1), 1u);
+}
+
 TEST(EyeFormChoice, IsMadeAnewForAnotherScene) {
     const std::shared_ptr<Scene> scene = room(), other = crowded_room(every_light().front().add, 24);
     const PassSettings pass = for_scene(scene->view(), balanced());
