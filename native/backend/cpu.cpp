@@ -79,11 +79,11 @@ public:
         counters.eye_samples = 0;
         scene_ = scene.view();
         pass_ = pass;
-        const size_t capacity = pass.kappa > 0 ? light_vertex_capacity(pass) : 0;
-        if (capacity_ != capacity) {
-            slots_ = allocate<LightVertex>(capacity);
-            stored_ = allocate<VlpCandidate>(capacity);
-            capacity_ = capacity;
+        const size_t bytes = pass.kappa > 0 ? light_memory(pass) : 0;
+        if (light_memory_ != bytes) {
+            slots_ = allocate<LightVertex>(bytes > 0 ? light_vertex_capacity(pass) : 0);
+            stored_ = allocate<VlpCandidate>(bytes > 0 ? candidate_capacity(pass) : 0);
+            light_memory_ = bytes;
         }
         vertices_in_piece_ = std::vector<uint32_t>(piece_count(pass));
         groups_ = std::vector<uint32_t>(groups_table(pass));
@@ -106,7 +106,7 @@ public:
             if (stop) return false;
             if (slots_) cache = list_stored();
         }
-        counters.stored_vlps = cache.stored_count;
+        counters.stored_vlps = slots_ ? groups_.back() : 0;
 
         pool_.run(static_cast<uint32_t>(tiles_.size()), [&](uint32_t i) {
             if (stop) return;
@@ -125,7 +125,7 @@ public:
 
     void add_memory(MemoryByDevice& memory) const override {
         MemoryUse& cpu = memory["CPU"];
-        cpu.light_vertices += capacity_ * (sizeof(LightVertex) + sizeof(VlpCandidate));
+        cpu.light_vertices += light_memory_;
         cpu.film += moments_.size() * (sizeof(PixelMoments) + sizeof(int8_t));
         cpu.work +=
             (vertices_in_piece_.capacity() + groups_.capacity()) * sizeof(uint32_t) + tiles_.capacity() * sizeof(Tile);
@@ -170,10 +170,13 @@ private:
             count_groups(pass_.vlp_grid, slots_.get(), first_slot(i), end_of(i), &groups_[i], pieces);
         });
         std::exclusive_scan(groups_.begin(), groups_.end(), groups_.begin(), 0u);
+        const Hands hands(pass_.vlp_candidates, groups_.back());
         pool_.run(pieces, [&](uint32_t i) {
-            list_groups(scene_, pass_, slots_.get(), first_slot(i), end_of(i), &groups_[i], pieces, stored_.get());
+            list_groups(scene_, pass_, slots_.get(), first_slot(i), end_of(i), &groups_[i], pieces, hands,
+                        stored_.get());
         });
-        return {slots_.get(), stored_.get(), groups_.back()};
+        list_blanks(hands, groups_.back(), stored_.get());
+        return {slots_.get(), stored_.get(), hands.count};
     }
 
     void run_tile(const SampleRates& rates, Film& film, const LightVertexCache& cache, Tile tile) {
@@ -221,7 +224,7 @@ private:
     ThreadPool pool_;
     RawArray<LightVertex> slots_;
     RawArray<VlpCandidate> stored_;
-    size_t capacity_ = 0;  // of both
+    size_t light_memory_ = 0;  // bytes of both
     std::vector<uint32_t> vertices_in_piece_;
     std::vector<uint32_t> groups_;  // the table of vlp_groups.h, a column for each piece; V last
     std::vector<Tile> tiles_;
@@ -238,8 +241,7 @@ std::unique_ptr<Backend> make_cpu_backend(const Scene& scene, const PassSettings
 void add_cpu_memory(MemoryByDevice& memory, Window window, const PassSettings& pass) {
     MemoryUse& cpu = memory["CPU"];
     cpu.film += sample_plan_bytes(window, pass);
-    if (pass.kappa > 0)
-        cpu.light_vertices += light_vertex_capacity(pass) * (sizeof(LightVertex) + sizeof(VlpCandidate));
+    if (pass.kappa > 0) cpu.light_vertices += light_memory(pass);
     cpu.work += (piece_count(pass) + groups_table(pass)) * sizeof(uint32_t) +
                 size_t{tiles_along(window.width)} * tiles_along(window.height) * sizeof(Tile);
 }

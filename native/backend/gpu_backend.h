@@ -223,7 +223,7 @@ private:
         for (pass_ = pass;; pass_.light_paths /= 2) {
             try {
                 resize(slots_, traced ? light_vertex_capacity(pass_) : 0, "light vertices");
-                resize(stored_, slots_.size(), "the list of virtual light points");
+                resize(stored_, traced ? candidate_capacity(pass_) : 0, "the list of virtual light points");
                 const uint32_t paths = traced ? pass_.light_paths : 0;
                 resize(vertices_in_path_, paths, "counts of light vertices");
                 resize(groups_, traced ? SortRuns(paths).table(k_vlp_groups) : 0, "counts of virtual light points");

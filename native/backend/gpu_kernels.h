@@ -81,10 +81,14 @@ struct ListStored {
 
     VLP_HD void operator()(uint32_t run) const {
         const CountStored& of = counted;
+        const uint32_t stored_count = of.groups[size_t{k_vlp_groups} * of.runs.count];
+        const Hands hands(of.pass.vlp_candidates, stored_count);
         of.for_paths(run, [&](uint32_t begin, uint32_t end) {
-            list_groups(of.scene, of.pass, of.slots, begin, end, of.groups + run, of.runs.count, stored);
+            list_groups(of.scene, of.pass, of.slots, begin, end, of.groups + run, of.runs.count, hands, stored);
         });
-        if (run == 0) counts->stored_vlps = of.groups[size_t{k_vlp_groups} * of.runs.count];
+        if (run > 0) return;
+        list_blanks(hands, stored_count, stored);
+        counts->stored_vlps = stored_count;
     }
 };
 
@@ -103,7 +107,8 @@ struct EyePass {
     VLP_HD uint32_t x_of(uint32_t pixel) const { return window.x + pixel % window.width; }
     VLP_HD uint32_t y_of(uint32_t pixel) const { return window.y + pixel / window.width; }
     VLP_HD LightVertexCache cache() const {
-        return {slots, stored, slots ? static_cast<uint32_t>(counts->stored_vlps) : 0};
+        const uint32_t stored_count = slots ? static_cast<uint32_t>(counts->stored_vlps) : 0;
+        return {slots, stored, Hands(pass.vlp_candidates, stored_count).count};
     }
     VLP_HD void keep(uint32_t pixel, const PixelResult& result) const {
         if (result.dropped > 0) AtomicAdd{}(counts->dropped, result.dropped);

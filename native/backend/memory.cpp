@@ -28,7 +28,7 @@ void add_gpu_memory(MemoryByDevice& memory, const Scene& scene, const PassSettin
     }
     gpu.work += sizeof(PassCounts);
     if (pass.traces_light()) {
-        gpu.light_vertices += light_vertex_capacity(pass) * (sizeof(LightVertex) + sizeof(VlpCandidate));
+        gpu.light_vertices += light_memory(pass);
         const size_t groups = SortRuns(pass.light_paths).table(k_vlp_groups);
         gpu.work += pass.light_paths * sizeof(uint8_t) + groups * sizeof(uint32_t) + scan_bytes(groups);
     }

@@ -40,6 +40,13 @@ void add_gpu_memory(MemoryByDevice& memory, const Scene& scene, const PassSettin
 inline size_t light_vertex_capacity(const PassSettings& pass) {
     return static_cast<size_t>(pass.light_paths) * pass.light_path_length;
 }
+// And for what connections choose from: V is no more than that, and M - 1 blanks.
+inline size_t candidate_capacity(const PassSettings& pass) {
+    return light_vertex_capacity(pass) + pass.vlp_candidates - 1;
+}
+inline size_t light_memory(const PassSettings& pass) {
+    return light_vertex_capacity(pass) * sizeof(LightVertex) + candidate_capacity(pass) * sizeof(VlpCandidate);
+}
 inline size_t film_channels(const PassSettings& pass) { return pass.guides ? Film::k_guided_channels : 4; }
 inline size_t film_bytes(Window window, const PassSettings& pass) {
     const size_t samples = sizeof(PixelSample) + (pass.guides ? sizeof(GuideSample) : 0);

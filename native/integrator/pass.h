@@ -64,12 +64,22 @@ struct alignas(32) VlpCandidate {
 };
 static_assert(sizeof(VlpCandidate) == 32, "a cache line holds two, a vector register one");
 
-// The virtual light points of one iteration. A path's hits follow one another in the slots; `stored` lists those that can be
-// connected, in the order of vlp_groups.h.
+// The V virtual light points of an iteration that can be connected, in hands of M: a connection is dealt one hand, which lies
+// together in memory. Each has one VLP from every M-th of the order of vlp_groups.h: hand h has numbers h, H + h, 2 H + h ...
+// Where M does not divide V, blanks that promise nothing stand for what the last ones lack.
+struct Hands {
+    uint32_t size, count;  // M, H
+
+    VLP_HD Hands(uint32_t m, uint32_t v) : size(m), count((v + m - 1) / m) {}
+    VLP_HD uint32_t place(uint32_t number) const { return number % count * size + number / count; }
+    VLP_HD uint32_t places() const { return size * count; }
+};
+
+// The virtual light points of one iteration. A path's hits follow one another in the slots.
 struct LightVertexCache {
     const LightVertex* slots = nullptr;
     const VlpCandidate* stored = nullptr;
-    uint32_t stored_count = 0;  // V
+    uint32_t hand_count = 0;  // in `stored`
 };
 
 // The streams that a seed and an iteration hold apart; the dimension that each walk step starts from.

@@ -41,7 +41,7 @@ struct StepDraws {
 };
 
 VLP_HD inline bool connects(const PassSettings& pass, const LightVertexCache& cache) {
-    return pass.kappa > 0 && cache.stored_count > 0 && pass.vlp_connections > 0;
+    return pass.kappa > 0 && cache.hand_count > 0 && pass.vlp_connections > 0;
 }
 
 // Member by member: processors are slow to load at once what was stored in parts.

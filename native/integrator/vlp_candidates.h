@@ -103,12 +103,14 @@ VLP_FORCE_INLINE void transpose(__m256 (&r)[8]) {
 
 }  // namespace detail
 
-// promises[i]: that of candidate `index[i]` of `list`.
-VLP_FORCE_INLINE void promise(const Receiver& to, const VlpCandidate* list, const uint32_t* index, float* promises) {
+// promises[i]: that of list[i], for i below `count`, which is k_candidates_at_once at most. There is room for as many.
+VLP_FORCE_INLINE void promise(const Receiver& to, const VlpCandidate* list, uint32_t count, float* promises) {
     static_assert(sizeof(VlpCandidate) == sizeof(__m256));
     const auto all = [](float x) { return _mm256_set1_ps(x); };
     __m256 row[8];
-    for (int i = 0; i < 8; ++i) row[i] = _mm256_load_ps(reinterpret_cast<const float*>(&list[index[i]]));
+    for (uint32_t i = 0; i < 8; ++i) {
+        row[i] = _mm256_load_ps(reinterpret_cast<const float*>(list + (i < count ? i : 0)));
+    }
     detail::transpose(row);
     const __m256 dx = _mm256_sub_ps(row[0], all(to.position.x)), dy = _mm256_sub_ps(row[1], all(to.position.y)),
                  dz = _mm256_sub_ps(row[2], all(to.position.z));
@@ -144,10 +146,10 @@ VLP_FORCE_INLINE void promise(const Receiver& to, const VlpCandidate* list, cons
 
 #else
 
-VLP_HD inline void promise(const Receiver& to, const VlpCandidate* list, const uint32_t* index, float* promises) {
+VLP_HD inline void promise(const Receiver& to, const VlpCandidate* list, uint32_t count, float* promises) {
     const auto facing = [](float cosine, float behind) { return cosine < 0 ? -cosine * behind : cosine; };
-    for (uint32_t i = 0; i < k_candidates_at_once; ++i) {
-        const VlpCandidate& c = list[index[i]];
+    for (uint32_t i = 0; i < count; ++i) {
+        const VlpCandidate& c = list[i];
         const Vec3 d = c.position - to.position;
         const float inverse = 1 / length_squared(d);
         const float geometry = facing(dot(to.normal, d), to.behind) * inverse *
@@ -163,32 +165,18 @@ VLP_HD inline void promise(const Receiver& to, const VlpCandidate* list, const u
 
 #endif
 
-// The M candidates of a connection that draws `u`, one after the other: one of the V stored VLPs from each of M strata of the
-// list, number floor((i V + u V / 2^32) / M).
-struct CandidateDraw {
-    uint32_t candidates, index, rest, step, step_rest;
-
-    VLP_HD CandidateDraw(const LightVertexCache& cache, uint32_t m, uint32_t u)
-        : candidates(m), step(cache.stored_count / m), step_rest(cache.stored_count % m) {
-        const auto at = static_cast<uint32_t>((static_cast<uint64_t>(u) * cache.stored_count) >> 32);
-        index = at / m, rest = at % m;
-    }
-    VLP_HD uint32_t next() {
-        const uint32_t drawn = index;
-        rest += step_rest;
-        const bool carry = rest >= candidates;
-        index += step + (carry ? 1 : 0);
-        rest -= carry ? candidates : 0;
-        return drawn;
-    }
-};
+// The candidates of a connection that draws `u`.
+VLP_HD inline const VlpCandidate* deal(const PassSettings& pass, const LightVertexCache& cache, uint32_t u) {
+    const auto hand = static_cast<uint32_t>((uint64_t{u} * cache.hand_count) >> 32);
+    return cache.stored + size_t{hand} * pass.vlp_candidates;
+}
 
 // Asks for the memory of the candidates that `u.x` draws, which lie anywhere.
 VLP_HD inline void prefetch_candidates([[maybe_unused]] const PassSettings& pass,
                                        [[maybe_unused]] const LightVertexCache& cache, [[maybe_unused]] SamplePair u) {
 #if !VLP_ON_DEVICE
-    CandidateDraw draw(cache, pass.vlp_candidates, u.x);
-    for (uint32_t i = 0; i < pass.vlp_candidates; ++i) __builtin_prefetch(cache.stored + draw.next());
+    const VlpCandidate* const hand = deal(pass, cache, u.x);
+    for (uint32_t i = 0; i < pass.vlp_candidates; i += 64 / sizeof(VlpCandidate)) __builtin_prefetch(hand + i);
 #endif
 }
 
@@ -198,20 +186,18 @@ struct VlpChoice {
     float stands_for = 0;
 };
 
-// Of M candidates, from M strata of the list, one in proportion to its promise: `u.x` draws them and `u.y` which is kept.
+// Of M candidates one in proportion to its promise: `u.x` draws them and `u.y` which is kept.
 VLP_HD inline VlpChoice choose_virtual_light_point(const PassSettings& pass, const LightVertexCache& cache,
                                                    const Receiver& receiver, SamplePair u) {
-    const uint32_t candidates = pass.vlp_candidates;
-    CandidateDraw draw(cache, candidates, u.x);
-    if (candidates == 1) return {cache.stored[draw.next()].slot, static_cast<float>(cache.stored_count)};
+    const VlpCandidate* const hand = deal(pass, cache, u.x);
+    const auto hands = static_cast<float>(cache.hand_count);
+    if (pass.vlp_candidates == 1) return {hand->slot, hands};
     VlpChoice kept;
     float u_keep = unit_float(u.y), kept_promise = 0, sum = 0;
-    for (uint32_t first = 0; first < candidates; first += k_candidates_at_once) {
-        const uint32_t count = min_of(candidates - first, k_candidates_at_once);
-        uint32_t index[k_candidates_at_once];
+    for (uint32_t first = 0; first < pass.vlp_candidates; first += k_candidates_at_once) {
+        const uint32_t count = min_of(pass.vlp_candidates - first, k_candidates_at_once);
         float promises[k_candidates_at_once];
-        for (uint32_t i = 0; i < k_candidates_at_once; ++i) index[i] = i < count ? draw.next() : index[0];
-        promise(receiver, cache.stored, index, promises);
+        promise(receiver, hand + first, count, promises);
         float here = 0;
         for (uint32_t i = 0; i < count; ++i) here += promises[i];
         if (!(here > 0)) continue;
@@ -232,13 +218,10 @@ VLP_HD inline VlpChoice choose_virtual_light_point(const PassSettings& pass, con
             begin += promises[i];
         }
         kept_promise = promises[lane];
-        kept.slot = cache.stored[index[lane]].slot;
+        kept.slot = hand[first + lane].slot;
         u_keep = (at - kept_begin) / kept_promise;
     }
-    if (kept_promise > 0) {
-        kept.stands_for =
-            static_cast<float>(cache.stored_count) * sum / (kept_promise * static_cast<float>(candidates));
-    }
+    if (kept_promise > 0) kept.stands_for = hands * sum / kept_promise;
     return kept;
 }
 

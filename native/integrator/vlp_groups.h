@@ -39,12 +39,17 @@ VLP_HD inline void count_groups(const VlpGrid& grid, const LightVertex* slots, u
     }
 }
 VLP_HD inline void list_groups(const SceneView& scene, const PassSettings& pass, const LightVertex* slots,
-                               uint32_t begin, uint32_t end, uint32_t* column, uint32_t stride, VlpCandidate* stored) {
+                               uint32_t begin, uint32_t end, uint32_t* column, uint32_t stride, const Hands& hands,
+                               VlpCandidate* stored) {
     for (uint32_t slot = begin; slot < end; ++slot) {
         if (!slots[slot].connectible()) continue;
-        stored[column[size_t{stride} * group_of(pass.vlp_grid, slots[slot])]++] =
-            make_candidate(scene, pass, slots, slot);
+        const uint32_t number = column[size_t{stride} * group_of(pass.vlp_grid, slots[slot])]++;
+        stored[hands.place(number)] = make_candidate(scene, pass, slots, slot);
     }
+}
+// After the V that were listed.
+VLP_HD inline void list_blanks(const Hands& hands, uint32_t stored_count, VlpCandidate* stored) {
+    for (uint32_t number = stored_count; number < hands.places(); ++number) stored[hands.place(number)] = {};
 }
 
 }  // namespace vlp

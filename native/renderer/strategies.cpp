@@ -40,7 +40,7 @@ struct StrategyRenderer::LightSink {
 StrategyRenderer::StrategyRenderer(std::shared_ptr<const Scene> scene, const PassSettings& pass, unsigned threads)
     : scene_(std::move(scene)), pass_(for_scene(scene_->view(), pass)), window_(scene_->window()), pool_(threads) {
     if (pass_.traces_light()) slots_.resize(light_vertex_capacity(pass_));
-    stored_.resize(slots_.size());
+    stored_.resize(candidate_capacity(pass_));
     sums_.resize(image(most_light_vertices() + 1, 0, false));
 }
 
@@ -54,8 +54,10 @@ void StrategyRenderer::iterate(uint32_t iteration) {
     std::vector<uint32_t> groups(k_vlp_groups + 1);
     count_groups(pass_.vlp_grid, slots_.data(), 0, end, groups.data(), 1);
     std::exclusive_scan(groups.begin(), groups.end(), groups.begin(), 0u);
-    list_groups(scene, pass_, slots_.data(), 0, end, groups.data(), 1, stored_.data());
-    const LightVertexCache cache{slots_.data(), stored_.data(), groups.back()};
+    const Hands hands(pass_.vlp_candidates, groups.back());
+    list_groups(scene, pass_, slots_.data(), 0, end, groups.data(), 1, hands, stored_.data());
+    list_blanks(hands, groups.back(), stored_.data());
+    const LightVertexCache cache{slots_.data(), stored_.data(), hands.count};
     pool_.run(window_.height, [&](uint32_t y) {
         for (uint32_t x = 0; x < window_.width; ++x) {
             EyeSink found{*this, static_cast<size_t>(y) * window_.width + x};

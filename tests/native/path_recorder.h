@@ -6,6 +6,7 @@
 
 #include "integrator/light_tracing.h"
 #include "integrator/path_tracing.h"
+#include "integrator/vlp_groups.h"
 #include "integrator/weights_reference.h"
 #include "renderer/renderer.h"
 
@@ -46,10 +47,18 @@ struct TracedLight {
             trace_light_path(scene, pass, k_light_stream, iteration, p, first, recorder);
         }
         splats = std::move(recorder.found);
+        std::vector<uint32_t> connectible;
         for (uint32_t i = 0; i < slots.size(); ++i) {
-            if (slots[i].connectible()) stored.push_back(make_candidate(scene, pass, slots.data(), i));
+            if (slots[i].connectible()) connectible.push_back(i);
         }
-        cache = {slots.data(), stored.data(), static_cast<uint32_t>(stored.size())};
+        const auto count = static_cast<uint32_t>(connectible.size());
+        const Hands hands(pass.vlp_candidates, count);
+        stored.resize(hands.places());
+        for (uint32_t i = 0; i < count; ++i) {
+            stored[hands.place(i)] = make_candidate(scene, pass, slots.data(), connectible[i]);
+        }
+        list_blanks(hands, count, stored.data());
+        cache = {slots.data(), stored.data(), hands.count};
     }
 };
 

@@ -2,6 +2,7 @@
 #include "integrator/vlp_candidates.h"
 
 #include "integrator/path_tracing.h"
+#include "integrator/vlp_groups.h"
 #include "path_recorder.h"
 #include "random_numbers.h"
 #include "transport_scenes.h"
@@ -37,14 +38,13 @@ void for_each_pair(const SceneView& scene, const PassSettings& pass, const Visit
             if (!scene.materials[eye.surface.material].has_finite) continue;
             const Receiver receiver = make_receiver(scene, pass, eye);
             const Bsdf bsdf = make_bsdf(scene, eye.surface);
-            for (uint32_t i = 0; i < light.cache.stored_count; i += k_candidates_at_once) {
-                uint32_t index[k_candidates_at_once];
+            const auto all = static_cast<uint32_t>(light.stored.size());
+            for (uint32_t i = 0; i < all; i += k_candidates_at_once) {
+                const uint32_t count = min_of(all - i, k_candidates_at_once);
                 float promises[k_candidates_at_once];
-                for (uint32_t k = 0; k < k_candidates_at_once; ++k)
-                    index[k] = min_of(i + k, light.cache.stored_count - 1);
-                promise(receiver, light.cache.stored, index, promises);
-                for (uint32_t k = 0; k < k_candidates_at_once; ++k) {
-                    const VlpChoice choice{light.cache.stored[index[k]].slot, 1};
+                promise(receiver, &light.stored[i], count, promises);
+                for (uint32_t k = 0; k < count; ++k) {
+                    const VlpChoice choice{light.stored[i + k].slot, 1};
                     visit(eye, promises[k], join_unshadowed(scene, pass, light.cache, eye, bsdf, choice).found);
                 }
             }
@@ -92,6 +92,7 @@ TEST(VlpCandidates, WhereThereIsLightItIsPromised) {
     }
 }
 
+// A hand of them all.
 struct Crowd {
     std::vector<VlpCandidate> list;
     LightVertexCache cache;
@@ -105,17 +106,18 @@ struct Crowd {
             list.push_back({at, encode(normal), detail::pack_halves(random.next(), random.next()),
                             detail::pack_halves(random.next(), 1.0f / 64), random.next(), 1000 + i});
         }
-        cache = {nullptr, list.data(), count};
+        cache = {nullptr, list.data(), 1};
     }
     std::vector<float> promises() const {
         std::vector<float> all;
         for (uint32_t i = 0; i < list.size(); ++i) {
-            uint32_t index[k_candidates_at_once];
-            float eight[k_candidates_at_once];
-            std::fill(std::begin(index), std::end(index), i);
-            promise(receiver, list.data(), index, eight);
-            for (const float p : eight) EXPECT_EQ(p, eight[0]);
-            all.push_back(eight[0]);
+            float alone[k_candidates_at_once], others[k_candidates_at_once];
+            promise(receiver, &list[i], 1, alone);
+            const uint32_t first = i / k_candidates_at_once * k_candidates_at_once;
+            promise(receiver, &list[first], min_of(static_cast<uint32_t>(list.size()) - first, k_candidates_at_once),
+                    others);
+            EXPECT_EQ(alone[0], others[i - first]) << "in any company";
+            all.push_back(alone[0]);
         }
         return all;
     }
@@ -206,24 +208,49 @@ TEST(VlpCandidates, PromisesOfHugeScenesAreKept) {
         pass.weighting = weighting, pass.kappa = 1, pass.vlp_candidates = 2;
         const VlpCandidate list[2]{make_candidate(scene.view(), pass, &vlp, 0),
                                    make_candidate(scene.view(), pass, &vlp, 0)};
-        const LightVertexCache cache{&vlp, list, 2};
+        const LightVertexCache cache{&vlp, list, 1};
         const VlpChoice choice =
             choose_virtual_light_point(pass, cache, make_receiver(scene.view(), pass, eye), {0, 0});
         EXPECT_NEAR(choice.stands_for, 2, 1e-5f) << static_cast<int>(weighting);
     }
 }
 
-TEST(VlpCandidates, CandidatesAreOfAllStrata) {
-    const Crowd crowd(1000);
-    for (const uint32_t m : {1u, 7u, 8u, 1000u, 1024u}) {
-        for (const uint32_t u : {0u, 1u, 0x80000000u, 0xffffffffu}) {
-            CandidateDraw draw(crowd.cache, m, u);
-            for (uint64_t i = 0; i < m; ++i) {
-                const uint64_t at = (uint64_t{u} * 1000) >> 32;
-                ASSERT_EQ(draw.next(), (i * 1000 + at) / m) << i << " of " << m;
-            }
+TEST(VlpCandidates, HandsAreDealtEvenly) {
+    const Crowd crowd(64);
+    PassSettings pass;
+    pass.vlp_candidates = 4;
+    const LightVertexCache cache{nullptr, crowd.list.data(), 16};
+    EXPECT_EQ(deal(pass, cache, 0), cache.stored);
+    EXPECT_EQ(deal(pass, cache, 0x0fffffffu), cache.stored);
+    EXPECT_EQ(deal(pass, cache, 0x10000000u), cache.stored + 4);
+    EXPECT_EQ(deal(pass, cache, 0xffffffffu), cache.stored + 60);
+}
+
+// Any hand but for one of blanks alone; over all hands and evenly spread u_keep every VLP brings, on average, what it is.
+TEST(VlpCandidates, EachBringsItselfInTheMean) {
+    const Crowd crowd(29);
+    const std::vector<float> promises = crowd.promises();
+    PassSettings pass;
+    pass.vlp_candidates = 8;
+    const Hands hands(8, 29);
+    std::vector<VlpCandidate> list(hands.places());
+    for (uint32_t i = 0; i < 29; ++i) list[hands.place(i)] = crowd.list[i];
+    list_blanks(hands, 29, list.data());
+    const LightVertexCache cache{nullptr, list.data(), hands.count};
+    std::vector<double> brought(29), one_draw(29);
+    constexpr uint32_t k_draws = 100000;
+    for (uint32_t hand = 0; hand < hands.count; ++hand) {
+        const uint32_t u = hand * (0xffffffffu / hands.count + 1) + 1;
+        for (uint32_t i = 0; i < k_draws; ++i) {
+            const auto u_keep = static_cast<uint32_t>((i + 0.5) / k_draws * 0x1p32);
+            const VlpChoice choice = choose_virtual_light_point(pass, cache, crowd.receiver, {u, u_keep});
+            ASSERT_GE(choice.slot, 1000u) << "no blank is kept";
+            const uint32_t at = choice.slot - 1000;
+            one_draw[at] = double(choice.stands_for) / k_draws / hands.count;
+            brought[at] += one_draw[at];
         }
     }
+    for (uint32_t i = 0; i < 29; ++i) EXPECT_NEAR(brought[i], 1, one_draw[i] + 0.001) << i << " promises " << promises[i];
 }
 
 }  // namespace

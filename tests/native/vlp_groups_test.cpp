@@ -85,19 +85,48 @@ TEST(VlpGroups, RunsListEachOnceInOrder) {
     std::stable_sort(expected.begin(), expected.end(), [&](uint32_t a, uint32_t b) { return group(a) < group(b); });
     for (const std::vector<uint32_t>& ends : {std::vector<uint32_t>{5000}, {1, 1, 4000, 5000}}) {
         const auto runs = static_cast<uint32_t>(ends.size());
-        std::vector<uint32_t> table(size_t{k_vlp_groups} * runs + 1), slots_stored;
-        std::vector<VlpCandidate> stored(expected.size());
+        std::vector<uint32_t> table(size_t{k_vlp_groups} * runs + 1);
+        std::vector<uint32_t> counted(table.size());
         const auto begin = [&](uint32_t run) { return run == 0 ? 0 : ends[run - 1]; };
         for (uint32_t i = 0; i < runs; ++i) {
             count_groups(k_unit_grid, slots.data(), begin(i), ends[i], &table[i], runs);
         }
         std::exclusive_scan(table.begin(), table.end(), table.begin(), 0u);
         EXPECT_EQ(table.back(), expected.size());
-        for (uint32_t i = 0; i < runs; ++i) {
-            list_groups(scene.view(), pass, slots.data(), begin(i), ends[i], &table[i], runs, stored.data());
+        for (const uint32_t m : {1u, 8u}) {
+            const Hands hands(m, table.back());
+            std::vector<VlpCandidate> stored(hands.places());
+            counted = table;
+            for (uint32_t i = 0; i < runs; ++i) {
+                list_groups(scene.view(), pass, slots.data(), begin(i), ends[i], &counted[i], runs, hands,
+                            stored.data());
+            }
+            std::vector<uint32_t> slots_stored;
+            for (uint32_t i = 0; i < table.back(); ++i) slots_stored.push_back(stored[hands.place(i)].slot);
+            EXPECT_EQ(slots_stored, expected);
         }
-        for (const VlpCandidate& vlp : stored) slots_stored.push_back(vlp.slot);
-        EXPECT_EQ(slots_stored, expected);
+    }
+}
+
+// Hand h has numbers h, H + h, 2 H + h ...; blanks, which reflect nothing, are where there is no such number.
+TEST(VlpGroups, HandsHaveOneOfEachStratum) {
+    for (const uint32_t v : {0u, 1u, 7u, 8u, 9u, 1000u}) {
+        for (const uint32_t m : {1u, 7u, 8u, 2000u}) {
+            const Hands hands(m, v);
+            EXPECT_EQ(hands.size, m);
+            EXPECT_EQ(hands.count, (v + m - 1) / m);
+            EXPECT_LT(hands.places(), v + m);
+            VlpCandidate unlisted{};
+            unlisted.red_and_green = 1;
+            std::vector<VlpCandidate> stored(hands.places(), unlisted);
+            for (uint32_t number = 0; number < v; ++number) stored[hands.place(number)].slot = 1 + number;
+            list_blanks(hands, v, stored.data());
+            for (uint32_t place = 0; place < stored.size(); ++place) {
+                const uint32_t number = place % m * hands.count + place / m;
+                EXPECT_EQ(stored[place].slot, number < v ? 1 + number : 0);
+                EXPECT_EQ(stored[place].red_and_green, number < v ? 1u : 0u);
+            }
+        }
     }
 }
 
