@@ -12,8 +12,10 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
+def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
     parser.addoption("--slow", action="store_true", help="also run the tests marked slow (minutes each)")
+    if not pluginmanager.hasplugin("timeout"):  # machines that only run tests/gpu may lack it
+        parser.addini("timeout", "most seconds of a test, where pytest-timeout is installed")
 
 
 def pytest_configure(config: pytest.Config) -> None:

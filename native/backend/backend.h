@@ -62,7 +62,7 @@ struct DeviceInfo {
 
 // GPUs that can run the passes; empty without a driver or in a build without CUDA.
 std::vector<DeviceInfo> cuda_devices();
-// What the first GPU reserves for the stacks of as many threads as it runs at a time; 0 where there is none.
+// What the first GPU reserves for the stacks of as many threads as it runs at a time; 0 where none can tell.
 size_t cuda_stack_bytes();
 
 }  // namespace vlp

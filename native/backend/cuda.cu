@@ -93,9 +93,10 @@ public:
     }
     void release(void* data, bool on_host) { on_host ? cudaFreeHost(data) : cudaFree(data); }
 
-    // In the passes' stream, so that they come after it; `from` is read before it returns.
+    // In the passes' stream, so that they come after it. It waits, as drivers may read pageable memory later than they return.
     void upload(void* to, const void* from, size_t bytes) {
         check_cuda(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, passes_), "uploading the scene");
+        check_cuda(cudaStreamSynchronize(passes_), "uploading the scene");
     }
     void clear(void* to, size_t bytes) {
         if (bytes > 0) check_cuda(cudaMemsetAsync(to, 0, bytes, passes_), "clearing memory");
@@ -109,7 +110,7 @@ public:
         run<<<blocks, k_block_size, 0, passes_>>>(body, begin, end);
         const cudaError_t error = cudaGetLastError();
         if (error == cudaErrorMemoryAllocation) {
-            check_cuda(error, "allocating " + std::to_string(stack_bytes()) + " bytes for the stacks of the passes");
+            check_cuda(error, "allocating " + std::to_string(stack_bytes_) + " bytes for the stacks of the passes");
         }
         check_cuda(error, "starting a pass");
     }
@@ -130,11 +131,12 @@ public:
         return state == cudaSuccess;
     }
 
-    size_t stack_bytes() const { return most_stack_bytes(); }
+    size_t stack_bytes() const { return stack_bytes_; }
 
 private:
     cudaStream_t stream(Queue in) const { return in == Queue::passes ? passes_ : copies_; }
 
+    const size_t stack_bytes_ = most_stack_bytes();  // a device that is lost tells nothing
     cudaStream_t passes_ = nullptr, copies_ = nullptr;
 };
 
@@ -159,6 +161,12 @@ std::vector<DeviceInfo> cuda_devices() {
     return devices;
 }
 
-size_t cuda_stack_bytes() { return cuda_devices().empty() ? 0 : most_stack_bytes(); }
+size_t cuda_stack_bytes() {
+    try {
+        return cuda_devices().empty() ? 0 : most_stack_bytes();
+    } catch (const std::runtime_error&) {  // as where this build has no code for the GPU
+        return 0;
+    }
+}
 
 }  // namespace vlp

@@ -34,8 +34,9 @@ public:
     DeviceBuffer(Device& device, size_t count, const std::string& what, bool on_host = false)
         : device_(&device), count_(count), on_host_(on_host) {
         if (count == 0) return;
-        const bool fits = on_host || bytes() <= device_memory_limit() - device_memory_taken();
-        if (fits) data_ = static_cast<T*>(device.allocate(bytes(), on_host));
+        const size_t limit = device_memory_limit(), taken = device_memory_taken();
+        if (on_host || (taken <= limit && bytes() <= limit - taken))
+            data_ = static_cast<T*>(device.allocate(bytes(), on_host));
         if (data_ == nullptr) {
             throw OutOfDeviceMemory(std::string("device ") + Device::k_name + ": allocating " +
                                     std::to_string(bytes()) + " bytes for " + what + ": out of memory");

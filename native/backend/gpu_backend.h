@@ -125,6 +125,8 @@ private:
     // Bound how long it takes to stop.
     static constexpr uint32_t k_batch = 1u << 18;
     static constexpr size_t k_nodes_at_once = 1u << 16;
+    // Of a film's sums, each of which a thread has the index of.
+    static constexpr size_t k_most_numbers = UINT32_MAX - 1024;
     // Light paths are halved until they fit, but not below this share of what was asked for.
     static constexpr uint32_t k_least_share = 64;
 
@@ -191,8 +193,12 @@ private:
     }
 
     void place_film(Window window, const PassSettings& pass) {
-        window_ = window;
         const size_t pixels = window.pixel_count();
+        if (pixels > k_most_numbers / film_channels(pass)) {
+            throw std::runtime_error(std::string("device ") + Device::k_name + ": a picture of " +
+                                     std::to_string(pixels) + " pixels is too large");
+        }
+        window_ = window;
         resize(frame_, pixels, "the film");
         resize(guides_, pass.guides ? pixels : 0, "a denoiser's guides");
         resize(sums_, pixels * film_channels(pass), "the film's sums");

@@ -46,6 +46,10 @@ struct SortRuns {
         : length(max_of(k_least_length, (all + k_most - 1) / k_most)), count((all + length - 1) / length) {}
     // The size of the table: a row for each group, and the number of all at its end.
     size_t table(uint32_t groups) const { return size_t{groups} * count + 1; }
+    // Of the largest table for a list of so many or fewer: shorter lists may have more runs.
+    static size_t largest_table(uint32_t all, uint32_t groups) {
+        return size_t{groups} * min_of(k_most, (all + k_least_length - 1) / k_least_length) + 1;
+    }
 };
 
 // Counts the groups of the VLPs of run `run`, a column of `groups`.

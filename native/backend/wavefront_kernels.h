@@ -95,7 +95,7 @@ struct WavefrontSize {
     }
     // Of two scans: of the samples of pixels, where they differ, and of the kinds of paths.
     size_t first_samples() const { return samples > pixels ? size_t{pixels} + 1 : 0; }
-    size_t groups() const { return SortRuns(slots).table(k_path_kinds); }
+    size_t groups() const { return SortRuns::largest_table(slots, k_path_kinds); }
     size_t scratch_bytes() const { return scan_bytes(max_of(first_samples(), groups())); }
 
     size_t bytes() const {

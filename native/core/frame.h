@@ -13,7 +13,8 @@ struct Frame {
 };
 
 VLP_HD inline Frame make_frame(Vec3 normal) {
-    const float sign = std::copysign(1.0f, normal.z);
+    // The frame jumps where this changes: not at 0, or rounding would tell those of one upright wall apart.
+    const float sign = normal.z < -0.25f ? -1.0f : 1.0f;
     const float a = -1.0f / (sign + normal.z);
     const float b = normal.x * normal.y * a;
     return {{1.0f + sign * normal.x * normal.x * a, sign * b, -sign * normal.x},

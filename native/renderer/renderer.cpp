@@ -249,9 +249,9 @@ void Renderer::update(std::shared_ptr<const Scene> scene, const PassSettings& pa
     unsaved_.clear();
     std::unique_ptr<Backend> helping;
     if (helper_) {
+        const std::lock_guard lock(mutex_);
         helping = helper_->release();
         spare_ = [&helping](const Scene&, const PassSettings&) { return std::move(helping); };
-        const std::lock_guard lock(mutex_);
         helper_.reset();
     }
     try {

@@ -22,7 +22,7 @@ from on_device import DEVICE, FORM, SCENES, load
 from vlp_bpt import Renderer, RenderSettings, devices, metrics
 from vlp_bpt.scene import Film
 
-SECONDS = 3.0
+SECONDS = 1.5
 RUNS = ((DEVICE, "paths"), (DEVICE, "wavefront"), (DEVICE, ""), ("HYBRID", ""), ("CPU", ""))
 if DEVICE == "CPU":
     RUNS = RUNS[-1:]
@@ -31,26 +31,28 @@ MARKS = {"cornell_box": (0.90, 0.97, 0.998), "sierpinski": (0.93, 0.97, 0.998)}
 
 def timed(
     name: str, mode: str, device: str = DEVICE, seconds: float = SECONDS, seed: int = 0, form: str = ""
-) -> Renderer:
-    """Rendered for `seconds`, and some iterations before that choose the form of the eye pass and warm up."""
+) -> tuple[Renderer, dict[str, float]]:
+    """Rendered for `seconds`, after some iterations that choose the form of the eye pass and warm up; and its rates."""
     os.environ[FORM] = form
-    settings = {"samples": 1 << 30, "device": device, "mode": mode, "seed": seed}
+    settings = {"samples": 1 << 30, "time_limit": seconds, "device": device, "mode": mode, "seed": seed}
     renderer = Renderer(load(name, Film(512, 512)), RenderSettings.from_dict(settings))
     renderer.iterate(6)
-    end, chunk = time.perf_counter() + seconds, 1
-    while time.perf_counter() < end:
-        started = time.perf_counter()
-        renderer.iterate(chunk)
-        chunk = max(1, min(2 * chunk, int(0.2 * chunk / (time.perf_counter() - started))))
-    return renderer
+    before = renderer.statistics
+    renderer.render()  # in one go: `iterate` throws away what a second device has begun
+    after = renderer.statistics
+    rates = {
+        f"{what}_per_second": (getattr(after, what) - getattr(before, what)) / (after.seconds - before.seconds)
+        for what in ("iterations", "eye_samples")
+    }
+    return renderer, rates
 
 
 def seconds_to_ssim(name: str, marks: tuple[float, ...]) -> dict[str, float | None]:
     """By renders of 1, 2, 4, ... iterations, between which the logarithms are interpolated; None where not reached."""
-    reference = timed(name, "PAPER", seconds=6 * SECONDS, seed=1).read()[..., :3]
+    reference = timed(name, "PAPER", seconds=6 * SECONDS, seed=1)[0].read()[..., :3]
     found: list[tuple[float, float]] = []
     if DEVICE != "CPU":  # short renders have no time to choose
-        os.environ[FORM] = timed(name, "PAPER", seconds=0.1).statistics.eye_form
+        os.environ[FORM] = timed(name, "PAPER", seconds=0.1)[0].statistics.eye_form
     for count in (2**i for i in range(20)):
         renderer = Renderer(
             load(name, Film(512, 512)), RenderSettings.from_dict({"samples": count, "device": DEVICE, "mode": "PAPER"})
@@ -70,7 +72,7 @@ def seconds_to_ssim(name: str, marks: tuple[float, ...]) -> dict[str, float | No
 
 def first_picture(name: str) -> dict[str, float]:
     """Seconds from an update with another camera to the picture of one iteration, in BALANCED mode: median and most."""
-    renderer = timed(name, "BALANCED", seconds=0.1)
+    renderer, _ = timed(name, "BALANCED", seconds=0.1)
     taken = []
     for i in range(20):
         scene = load(name, Film(512, 512))
@@ -87,31 +89,35 @@ def first_picture(name: str) -> dict[str, float]:
 def main(out: str) -> None:
     modes = ("PAPER", "BALANCED", "REFERENCE")
     rows: list[dict[str, Any]] = []
+    ssim: dict[str, dict[str, float | None]] = {}
+    first: dict[str, dict[str, float]] = {}
+
+    def save() -> None:  # what there is, should the time be up
+        report = {"devices": devices(), "rates": rows, "seconds_to_ssim": ssim, "seconds_to_first_picture": first}
+        (Path(out) / "gpu.json").write_text(json.dumps(report, indent=1))
+
+    print("| scene | mode | device | eye pass | iterations/s | M eye samples/s |\n|---|---|---|---|---|---|")
     for name in SCENES:
         for mode in modes:
             for device, form in RUNS:
-                taken = timed(name, mode, device, form=form).statistics
+                renderer, rates = timed(name, mode, device, form=form)
+                taken = renderer.statistics
                 row = {"scene": name, "mode": mode, "device": device, "eye_form": taken.eye_form, "chosen": not form}
-                rates = {
-                    "iterations_per_second": taken.iterations / taken.seconds,
-                    "eye_samples_per_second": taken.eye_samples_per_second,
-                }
-                rows.append({**row, **rates, "memory": taken.memory})
-    ssim = {name: seconds_to_ssim(name, marks) for name, marks in MARKS.items()}
-    first = {name: first_picture(name) for name in SCENES}
-    report = {"devices": devices(), "rates": rows, "seconds_to_ssim": ssim, "seconds_to_first_picture": first}
-    (Path(out) / "gpu.json").write_text(json.dumps(report, indent=1))
-    print("| scene | mode | device | eye pass | iterations/s | M eye samples/s |\n|---|---|---|---|---|---|")
-    for row in rows:
-        rates = f"{row['iterations_per_second']:.1f} | {row['eye_samples_per_second'] / 1e6:.2f}"
-        form = row["eye_form"] + (", chosen" if row["chosen"] and row["device"] != "CPU" else "")
-        print(f"| {row['scene']} | {row['mode']} | {row['device']} | {form} | {rates} |")
-    print("\n| scene | seconds to SSIM |\n|---|---|")
-    for name, found in ssim.items():
-        print(f"| {name} | {', '.join(f'{mark}: {seconds}' for mark, seconds in found.items())} |")
+                rows.append({**row, **rates, "memory": taken.memory, "warnings": renderer.warnings})
+                save()
+                eye_pass = taken.eye_form + (", chosen" if not form and device != "CPU" else "")
+                told = f"{rates['iterations_per_second']:.1f} | {rates['eye_samples_per_second'] / 1e6:.2f}"
+                print(f"| {name} | {mode} | {device} | {eye_pass} | {told} |", flush=True)
     print("\n| scene | ms from another camera to its first picture: median, most |\n|---|---|")
-    for name, seconds in first.items():
-        print(f"| {name} | {1e3 * seconds['median']:.1f}, {1e3 * seconds['most']:.1f} |")
+    for name in SCENES:
+        seconds = first[name] = first_picture(name)
+        save()
+        print(f"| {name} | {1e3 * seconds['median']:.1f}, {1e3 * seconds['most']:.1f} |", flush=True)
+    print("\n| scene | seconds to SSIM |\n|---|---|")
+    for name, marks in MARKS.items():
+        found = ssim[name] = seconds_to_ssim(name, marks)
+        save()
+        print(f"| {name} | {', '.join(f'{mark}: {seconds}' for mark, seconds in found.items())} |", flush=True)
 
 
 if __name__ == "__main__":

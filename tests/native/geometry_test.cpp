@@ -1,6 +1,7 @@
 // Encoded normals, and the surface at a hit.
 #include <gtest/gtest.h>
 
+#include "core/frame.h"
 #include "geometry/surface.h"
 #include "scene/scene.h"
 #include "tests/native/bvh_oracle.h"
@@ -12,6 +13,23 @@ void expect_near(Vec3 a, Vec3 b, float tolerance) {
     EXPECT_NEAR(a.x, b.x, tolerance);
     EXPECT_NEAR(a.y, b.y, tolerance);
     EXPECT_NEAR(a.z, b.z, tolerance);
+}
+
+TEST(Frame, IsOrthonormalAndTheSameForAllNormalsOfAnUprightWall) {
+    std::mt19937 random(3);
+    for (int i = 0; i < 10000; ++i) {
+        const Vec3 n = random_direction(random);
+        const Frame frame = make_frame(n);
+        EXPECT_NEAR(length(frame.tangent), 1, 1e-6f);
+        EXPECT_NEAR(length(frame.bitangent), 1, 1e-6f);
+        EXPECT_NEAR(dot(frame.tangent, frame.bitangent), 0, 1e-6f);
+        expect_near(cross(frame.tangent, frame.bitangent), n, 1e-6f);
+
+        const Vec3 upright = normalize({n.x, n.y, 0});
+        const Frame above = make_frame(upright + Vec3{0, 0, 1e-8f}), below = make_frame(upright - Vec3{0, 0, 1e-8f});
+        expect_near(above.tangent, below.tangent, 1e-6f);
+        expect_near(above.bitangent, below.bitangent, 1e-6f);
+    }
 }
 
 TEST(Octahedral, RoundTrip) {

@@ -223,6 +223,27 @@ TEST(GpuMemory, TheHelperHasAsManyLightPaths) {
     }
 }
 
+TEST(GpuMemory, ALimitBelowWhatIsTakenLeavesNoRoom) {
+    const auto scene = room();
+    const PassSettings pass = for_scene(scene->view(), balanced());
+    HostMachine machine;
+    const HostBackend first(*scene, pass, machine);
+    const MemoryLimit limit(device_memory_taken() - 1);
+    EXPECT_THROW(HostBackend(*scene, pass, machine), OutOfDeviceMemory);
+}
+
+// Its sums have more numbers than a thread's index can count.
+TEST(GpuMemory, APictureThatIsTooLargeIsRefused) {
+    const auto scene = room(32768);
+    HostMachine machine;
+    try {
+        const HostBackend gpu(*scene, for_scene(scene->view(), balanced()), machine);
+        FAIL();
+    } catch (const std::runtime_error& error) {
+        EXPECT_STREQ(error.what(), "device HOST: a picture of 1073741824 pixels is too large");
+    }
+}
+
 TEST(GpuMemory, WithoutRoomForTheSceneTheCpuRenders) {
     const auto scene = room();
     const MemoryLimit limit(1000);

@@ -5,12 +5,15 @@
 #include <cstring>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
 #include <vector>
 
 #include "backend/gpu_backend.h"
+
+#include <gtest/gtest.h>
 
 namespace vlp::test {
 
@@ -41,11 +44,17 @@ public:
     explicit HostDevice(HostMachine& machine) : machine_(machine) {}
 
     void* allocate(size_t bytes, bool) {
-        void* const data = ::operator new(bytes, std::align_val_t{64});
-        std::memset(data, 0xa5, bytes);
+        auto* const data = static_cast<std::byte*>(::operator new(bytes + k_guard, std::align_val_t{64}));
+        std::memset(data, 0xa5, bytes + k_guard);
+        bytes_of_[data] = bytes;
         return data;
     }
-    void release(void* data, bool) { ::operator delete(data, std::align_val_t{64}); }
+    void release(void* data, bool) {
+        const auto* const guard = static_cast<std::byte*>(data) + bytes_of_.extract(data).mapped();
+        const bool intact = std::all_of(guard, guard + k_guard, [](std::byte b) { return b == std::byte{0xa5}; });
+        EXPECT_TRUE(intact) << "written behind the end of a buffer";
+        ::operator delete(data, std::align_val_t{64});
+    }
 
     void upload(void* to, const void* from, size_t bytes) {
         do_until(pending(Queue::passes).queued, Queue::passes);
@@ -118,7 +127,10 @@ private:
         }
     }
 
+    static constexpr size_t k_guard = 4096;
+
     HostMachine& machine_;
+    std::map<void*, size_t> bytes_of_;
     std::array<Pending, 2> queues_;
     size_t queued_launches_ = 0;
     bool lost_ = false;

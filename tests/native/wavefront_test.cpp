@@ -31,6 +31,17 @@ TEST(Wavefront, OfManyConnectionsHasFewerPaths) {
     EXPECT_EQ(small.slots, WavefrontSize::k_most_slots);
 }
 
+TEST(Wavefront, HasRoomForTheTablesOfAllItsRounds) {
+    for (const uint32_t connections : {1u, 2u, 5u, 9u}) {
+        PassSettings pass = balanced();
+        pass.light_samples = connections, pass.kappa = 1;
+        const WavefrontSize size(pass, 1u << 20);
+        for (uint32_t paths = 1; paths <= size.slots; ++paths) {
+            ASSERT_LE(SortRuns(paths).table(k_path_kinds), size.groups()) << paths << " of " << size.slots;
+        }
+    }
+}
+
 TEST(EyeFormChoice, TakesTheFasterForm) {
     for (const EyeForm faster : {EyeForm::paths, EyeForm::wavefront}) {
         EyeFormChoice choice;
