@@ -116,6 +116,33 @@ double copy_bandwidth() {
     return 2.0 * k_rows * sizeof(float4) / seconds;
 }
 
+// The least that a search does with what it visits, in operations on single precision numbers, a product and a sum in one. For
+// each of a node's eight children: where the ray meets six planes, the last entry and the first exit of them, a comparison.
+// For a triangle: three vertices in the ray's space (9 differences, 6 shears), twice three products for the edges, their sum,
+// and the distance (3).
+constexpr double k_node_operations = 8 * (6 + 6 + 1), k_triangle_operations = 9 + 6 + 6 + 2 + 3;
+
+// Such operations that the GPU can begin in a second.
+double operations_per_second() {
+    int device = 0, processors = 0, kilohertz = 0, major = 0, minor = 0;
+    check(cudaGetDevice(&device));
+    check(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device));
+    check(cudaDeviceGetAttribute(&kilohertz, cudaDevAttrClockRate, device));
+    check(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device));
+    check(cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, device));
+    const int lanes = major < 8 || (major == 8 && minor == 0) ? 64 : 128;  // a processor, by the CUDA programming guide
+    return 1e3 * kilohertz * processors * lanes;
+}
+
+// On average; those that a block lacks are not looked at.
+double triangles_in_a_block(const std::vector<TriangleBlock>& blocks) {
+    size_t triangles = 0;
+    for (const TriangleBlock& block : blocks) {
+        for (const uint32_t primitive : block.primitive) triangles += primitive != k_none;
+    }
+    return static_cast<double>(triangles) / static_cast<double>(blocks.size());
+}
+
 struct Form {
     const char* name;
     size_t node_bytes;
@@ -123,12 +150,12 @@ struct Form {
 };
 
 struct Measured {
-    double rays_per_second, bytes_per_ray;
+    double rays_per_second, bytes_per_ray, operations_per_ray;
     std::vector<float> found;
 };
 
 template <typename Search>
-Measured measure(const Form& form, const std::vector<Ray>& rays) {
+Measured measure(const Form& form, const std::vector<Ray>& rays, double triangles_in_a_block) {
     const OnDevice<Ray> rays_there(rays);
     const OnDevice<float> found(rays.size());
     const auto count = static_cast<uint32_t>(rays.size());
@@ -142,7 +169,9 @@ Measured measure(const Form& form, const std::vector<Ray>& rays) {
     for (uint32_t i = 0; i < count; i += step, ++counted) Search::trace(form.here, rays[i]);
     const double tree = static_cast<double>(visited_nodes) * static_cast<double>(form.node_bytes) +
                         static_cast<double>(visited_blocks) * sizeof(TriangleBlock);
-    return {count / seconds, tree / counted + sizeof(Ray) + sizeof(float), found.read()};
+    const double operations = static_cast<double>(visited_nodes) * k_node_operations +
+                              static_cast<double>(visited_blocks) * triangles_in_a_block * k_triangle_operations;
+    return {count / seconds, tree / counted + sizeof(Ray) + sizeof(float), operations / counted, found.read()};
 }
 
 // How many differ by more than rounding, which decides between triangles that share an edge.
@@ -178,30 +207,39 @@ int run(const char* out) {
     std::shuffle(scattered.rays.begin(), scattered.rays.end(), std::mt19937(1));
     sets.insert(sets.begin() + 2, std::move(scattered));
 
-    const double bandwidth = copy_bandwidth();
+    const double filled = triangles_in_a_block(bvh.triangle_blocks);
+    const double bandwidth = copy_bandwidth(), arithmetic = operations_per_second();
     std::FILE* const file = std::fopen(out, "w");
     if (!file) throw std::runtime_error(std::string("cannot write ") + out);
-    std::fprintf(file, "{\"scene\": \"%s\", \"primitives\": %zu, \"copy_bytes_per_second\": %.4g, \"rays\": [",
-                 scene.name.c_str(), scene.primitive_count(), bandwidth);
-    std::printf("\n%s, %zu primitives; memory copies at %.0f GB/s\n\n", scene.name.c_str(), scene.primitive_count(),
-                bandwidth * 1e-9);
-    std::printf("| rays | nodes | M rays/s | bytes a ray | GB/s | of the copy's |\n|---|---|---|---|---|---|\n");
+    std::fprintf(file,
+                 "{\"scene\": \"%s\", \"primitives\": %zu, \"copy_bytes_per_second\": %.4g, \"operations_per_second\": "
+                 "%.4g, \"rays\": [",
+                 scene.name.c_str(), scene.primitive_count(), bandwidth, arithmetic);
+    std::printf("\n%s, %zu primitives; memory copies at %.0f GB/s, %.1f T operations/s\n\n", scene.name.c_str(),
+                scene.primitive_count(), bandwidth * 1e-9, arithmetic * 1e-12);
+    std::printf(
+        "| rays | nodes | M rays/s | bytes a ray | GB/s | ns a ray | floor by bytes | floor by operations "
+        "|\n|---|---|---|---|---|---|---|---|\n");
     const char* separator = "";
     size_t wrong = 0, searched = 0;
     for (const RaySet& set : sets) {
-        const Measured of_wide = set.any ? measure<WideAny>(wide, set.rays) : measure<WideClosest>(wide, set.rays);
-        const Measured of_packed =
-            set.any ? measure<CompressedAny>(packed, set.rays) : measure<CompressedClosest>(packed, set.rays);
+        const Measured of_wide =
+            set.any ? measure<WideAny>(wide, set.rays, filled) : measure<WideClosest>(wide, set.rays, filled);
+        const Measured of_packed = set.any ? measure<CompressedAny>(packed, set.rays, filled)
+                                           : measure<CompressedClosest>(packed, set.rays, filled);
         wrong += differing(of_wide.found, of_packed.found);
         searched += set.rays.size();
         for (const auto& [form, m] : {std::pair{&wide, &of_wide}, std::pair{&packed, &of_packed}}) {
-            const double rate = m->rays_per_second * m->bytes_per_ray;
-            std::printf("| %s | %s | %.0f | %.0f | %.0f | %.2f |\n", set.name, form->name, m->rays_per_second * 1e-6,
-                        m->bytes_per_ray, rate * 1e-9, rate / bandwidth);
+            const double by_bytes = m->bytes_per_ray / bandwidth, by_operations = m->operations_per_ray / arithmetic;
+            std::printf("| %s | %s | %.0f | %.0f | %.0f | %.3f | %.3f | %.3f |\n", set.name, form->name,
+                        m->rays_per_second * 1e-6, m->bytes_per_ray, m->rays_per_second * m->bytes_per_ray * 1e-9,
+                        1e9 / m->rays_per_second, 1e9 * by_bytes, 1e9 * by_operations);
             std::fprintf(file,
                          "%s\n {\"rays\": \"%s\", \"nodes\": \"%s\", \"rays_per_second\": %.4g, "
-                         "\"bytes_per_ray\": %.1f, \"share_of_copy\": %.3f}",
-                         separator, set.name, form->name, m->rays_per_second, m->bytes_per_ray, rate / bandwidth);
+                         "\"bytes_per_ray\": %.1f, \"operations_per_ray\": %.1f, \"floor_seconds_by_bytes\": %.4g, "
+                         "\"floor_seconds_by_operations\": %.4g}",
+                         separator, set.name, form->name, m->rays_per_second, m->bytes_per_ray, m->operations_per_ray,
+                         by_bytes, by_operations);
             separator = ",";
         }
     }

@@ -250,7 +250,8 @@ TEST(VlpCandidates, EachBringsItselfInTheMean) {
             brought[at] += one_draw[at];
         }
     }
-    for (uint32_t i = 0; i < 29; ++i) EXPECT_NEAR(brought[i], 1, one_draw[i] + 0.001) << i << " promises " << promises[i];
+    for (uint32_t i = 0; i < 29; ++i)
+        EXPECT_NEAR(brought[i], 1, one_draw[i] + 0.001) << i << " promises " << promises[i];
 }
 
 }  // namespace
