@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-constexpr uint32_t k_first_block = 8;  // iterations
+constexpr uint32_t k_first_block = 4;  // iterations
 // A pixel's own variance is known badly, and a pixel that has not met its speck yet seems to have none: it is the mean over
 // the pixels around, up to so far, that counts, and this share of what deviates on average is added everywhere.
 constexpr int k_radius = 2;

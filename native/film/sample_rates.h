@@ -66,7 +66,7 @@ VLP_HD inline PixelTurn turn_of(const SampleRates& rates, uint32_t pixel) {
     return {1u << max_of(level, 0), rates.sequence, rates.moments[pixel].samples};
 }
 
-// The blocks of a render on one device (host only). Blocks end after 8, 16, 32 ... iterations; the first has no levels. Where
+// The blocks of a render on one device (host only). Blocks end after 4, 8, 16 ... iterations; the first has no levels. Where
 // sampling is not adaptive it never ends, and iteration i takes number i of each pixel's sequence. Else a device takes all
 // numbers of a sequence of its own: devices that share the iterations would take some of one sequence twice.
 class SamplePlan {

@@ -123,7 +123,7 @@ class RenderSettings:
     points joined to one eye vertex. vlp_candidates: M, how many each of them is chosen from, by the light that it
     would bring if nothing stood between. light_samples: S, light samples at one eye vertex. splats: light paths are
     joined to the lens. roulette: paths end at random, the dimmer the sooner, and those that go on make up for it; else
-    all of them go on up to L and K. adaptive: from the ninth iteration on, iterations take more samples in pixels that
+    all of them go on up to L and K. adaptive: from the fifth iteration on, iterations take more samples in pixels that
     are noisier and fewer in others, one a pixel on average; without bias (native/film/sample_rates.h). hits: eye paths
     that meet a light count.
     clamp_direct, clamp_indirect: the most that one find of light after at most one surface, or after more, may add to

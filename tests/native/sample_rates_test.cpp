@@ -165,8 +165,8 @@ TEST(SamplePlan, TheMeanIsRightAtAnyTime) {
         const float chance = 0.01f * static_cast<float>(1 + pixel % 16);
         return uniform(random) < chance ? 1 / chance : 0.0f;  // mean 1
     };
-    constexpr int k_films = 400;
-    const std::vector<int> times = {8, 9, 13, 16, 21, 32, 33, 50, 64};
+    constexpr int k_films = 600;
+    const std::vector<int> times = {4, 5, 7, 8, 9, 13, 16, 21, 32, 33, 50, 64};
     std::vector<double> first(times.size()), second(times.size());
     for (int f = 0; f < k_films; ++f) {
         Simulation film;

@@ -57,7 +57,7 @@ def test_it_is_the_same_picture_with_less_noise() -> None:
 
 
 def test_the_first_iterations_are_those_without_it() -> None:
-    first, without = rendered(8), rendered(8, adaptive=False)
+    first, without = rendered(4), rendered(4, adaptive=False)
     assert np.array_equal(first.film_state(), without.film_state())
     first.iterate(1), without.iterate(1)
     assert not np.array_equal(first.film_state(), without.film_state())
