@@ -20,16 +20,28 @@ constexpr uint32_t k_tile = 16;  // pixels a side
 constexpr uint32_t k_rows = 16;  // of the film that are cleared or committed at a time
 
 // Memory on cache-line boundaries, left uninitialised: what is read has been written before.
-struct AlignedDeleter {
-    void operator()(void* p) const { ::operator delete(p, std::align_val_t{64}); }
-};
 template <typename T>
-using RawArray = std::unique_ptr<T[], AlignedDeleter>;
+class RawArray {
+public:
+    // Another size loses what it held.
+    void resize(size_t count) {
+        if (count == count_) return;
+        data_.reset();  // first, to have its room
+        count_ = 0;
+        if (count > 0) data_.reset(static_cast<T*>(::operator new(count * sizeof(T), std::align_val_t{64})));
+        count_ = count;
+    }
+    T* data() const { return data_.get(); }
+    size_t bytes() const { return count_ * sizeof(T); }
 
-template <typename T>
-RawArray<T> allocate(size_t count) {
-    return RawArray<T>(count > 0 ? static_cast<T*>(::operator new(count * sizeof(T), std::align_val_t{64})) : nullptr);
-}
+private:
+    struct AlignedDeleter {
+        void operator()(void* p) const { ::operator delete(p, std::align_val_t{64}); }
+    };
+
+    std::unique_ptr<T[], AlignedDeleter> data_;
+    size_t count_ = 0;
+};
 
 // Every other bit of `code`, gathered: a coordinate of a Morton code.
 uint32_t compact_bits(uint32_t code) {
@@ -79,12 +91,8 @@ public:
         counters.eye_samples = 0;
         scene_ = scene.view();
         pass_ = pass;
-        const size_t bytes = pass.kappa > 0 ? light_memory(pass) : 0;
-        if (light_memory_ != bytes) {
-            slots_ = allocate<LightVertex>(bytes > 0 ? light_vertex_capacity(pass) : 0);
-            stored_ = allocate<VlpCandidate>(bytes > 0 ? candidate_capacity(pass) : 0);
-            light_memory_ = bytes;
-        }
+        slots_.resize(has_vlps() ? light_vertex_capacity(pass) : 0);
+        stored_.resize(has_vlps() ? candidate_capacity(pass) : 0);
         vertices_in_piece_ = std::vector<uint32_t>(piece_count(pass));
         groups_ = std::vector<uint32_t>(groups_table(pass));
         tiles_ = tiles_in_morton_order(scene.window());
@@ -104,9 +112,9 @@ public:
         if (pieces > 0) {
             run_light_pass(iteration, film, stop);
             if (stop) return false;
-            if (slots_) cache = list_stored();
+            if (has_vlps()) cache = list_stored();
         }
-        counters.stored_vlps = slots_ ? groups_.back() : 0;
+        counters.stored_vlps = has_vlps() ? groups_.back() : 0;
 
         pool_.run(static_cast<uint32_t>(tiles_.size()), [&](uint32_t i) {
             if (stop) return;
@@ -125,13 +133,15 @@ public:
 
     void add_memory(MemoryByDevice& memory) const override {
         MemoryUse& cpu = memory["CPU"];
-        cpu.light_vertices += light_memory_;
+        cpu.light_vertices += slots_.bytes() + stored_.bytes();
         cpu.film += moments_.size() * (sizeof(PixelMoments) + sizeof(int8_t));
         cpu.work +=
             (vertices_in_piece_.capacity() + groups_.capacity()) * sizeof(uint32_t) + tiles_.capacity() * sizeof(Tile);
     }
 
 private:
+    bool has_vlps() const { return pass_.kappa > 0; }
+
     template <typename Body>
     void for_rows(const Film& film, const Body& body) {
         const uint32_t height = film.window().height;
@@ -152,7 +162,7 @@ private:
             uint32_t vertices = 0;
             const uint32_t end = std::min((piece + 1) * k_paths_per_piece, pass_.light_paths);
             for (uint32_t path = piece * k_paths_per_piece; path < end; ++path) {
-                LightVertex* slots = slots_ ? slots_.get() + first_slot(piece) + vertices : path_alone;
+                LightVertex* slots = has_vlps() ? slots_.data() + first_slot(piece) + vertices : path_alone;
                 vertices += trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots, sink);
             }
             vertices_in_piece_[piece] = vertices;
@@ -167,16 +177,16 @@ private:
         const auto end_of = [&](uint32_t piece) { return first_slot(piece) + vertices_in_piece_[piece]; };
         std::fill(groups_.begin(), groups_.end(), 0u);
         pool_.run(pieces, [&](uint32_t i) {
-            count_groups(pass_.vlp_grid, slots_.get(), first_slot(i), end_of(i), &groups_[i], pieces);
+            count_groups(pass_.vlp_grid, slots_.data(), first_slot(i), end_of(i), &groups_[i], pieces);
         });
         std::exclusive_scan(groups_.begin(), groups_.end(), groups_.begin(), 0u);
         const Hands hands(pass_.vlp_candidates, groups_.back());
         pool_.run(pieces, [&](uint32_t i) {
-            list_groups(scene_, pass_, slots_.get(), first_slot(i), end_of(i), &groups_[i], pieces, hands,
-                        stored_.get());
+            list_groups(scene_, pass_, slots_.data(), first_slot(i), end_of(i), &groups_[i], pieces, hands,
+                        stored_.data());
         });
-        list_blanks(hands, groups_.back(), stored_.get());
-        return {slots_.get(), stored_.get(), hands.count};
+        list_blanks(hands, groups_.back(), stored_.data());
+        return {slots_.data(), stored_.data(), hands.count};
     }
 
     void run_tile(const SampleRates& rates, Film& film, const LightVertexCache& cache, Tile tile) {
@@ -224,7 +234,6 @@ private:
     ThreadPool pool_;
     RawArray<LightVertex> slots_;
     RawArray<VlpCandidate> stored_;
-    size_t light_memory_ = 0;  // bytes of both
     std::vector<uint32_t> vertices_in_piece_;
     std::vector<uint32_t> groups_;  // the table of vlp_groups.h, a column for each piece; V last
     std::vector<Tile> tiles_;

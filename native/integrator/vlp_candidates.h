@@ -171,7 +171,7 @@ VLP_HD inline const VlpCandidate* deal(const PassSettings& pass, const LightVert
     return cache.stored + size_t{hand} * pass.vlp_candidates;
 }
 
-// Asks for the memory of the candidates that `u.x` draws, which lie anywhere.
+// Asks for the memory of the candidates that `u.x` draws: their hand lies anywhere.
 VLP_HD inline void prefetch_candidates([[maybe_unused]] const PassSettings& pass,
                                        [[maybe_unused]] const LightVertexCache& cache, [[maybe_unused]] SamplePair u) {
 #if !VLP_ON_DEVICE

@@ -162,6 +162,28 @@ TEST(TwoDevices, TheHelperGoesOnAloneWhenTheOtherFails) {
     EXPECT_EQ(pair.renderer->dropped(), 16u);
 }
 
+// From 40 paths and 181 candidates to 100 paths and 1: as many bytes in all, but not of each array.
+TEST(CpuBackend, AnUpdateMakesRoomForEachArray) {
+    const std::shared_ptr<Scene> scene = crowded_room(every_light().front().add, 8, {});
+    PassSettings pass;
+    pass.light_path_length = 1, pass.eye_path_length = 2;
+    pass.light_paths = 40, pass.vlp_candidates = 181;
+    const PassSettings before = for_scene(scene->view(), pass);
+    pass.light_paths = 100, pass.vlp_candidates = 1;
+    const PassSettings after = for_scene(scene->view(), pass);
+    Renderer updated(scene, before, scene->window(), Devices{make_cpu_backend(*scene, before, 1), nullptr, {}, {}}, 0,
+                     4);
+    Renderer anew(scene, after, scene->window(), Devices{make_cpu_backend(*scene, after, 1), nullptr, {}, {}}, 0, 4);
+    EXPECT_EQ(updated.memory().at("CPU").light_vertices, anew.memory().at("CPU").light_vertices);
+    EXPECT_EQ(updated.iterate(2), 2u);
+    updated.update(scene, after, 0, 4);
+    EXPECT_EQ(updated.iterate(4), 4u);
+    EXPECT_EQ(anew.iterate(4), 4u);
+    EXPECT_GT(anew.stored_vlps(), 40u);
+    const auto a = updated.film().sums(), b = anew.film().sums();
+    EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size_bytes()), 0);
+}
+
 // Two CPU back ends with splats and guides: the sums are bit for bit those of one, and the picture is that without guides.
 TEST(TwoDevices, MakeThePictureOfOne) {
     const std::shared_ptr<Scene> scene = crowded_room(every_light().front().add, 24, {});

@@ -226,7 +226,7 @@ TEST(VlpCandidates, HandsAreDealtEvenly) {
     EXPECT_EQ(deal(pass, cache, 0xffffffffu), cache.stored + 60);
 }
 
-// Any hand but for one of blanks alone; over all hands and evenly spread u_keep every VLP brings, on average, what it is.
+// Over all hands and evenly spread u_keep every VLP stands for one of itself on average, but for the last draw that it may miss.
 TEST(VlpCandidates, EachBringsItselfInTheMean) {
     const Crowd crowd(29);
     const std::vector<float> promises = crowd.promises();
