@@ -58,9 +58,14 @@ struct Tile {
 
 uint32_t tiles_along(uint32_t pixels) { return (pixels + k_tile - 1) / k_tile; }
 
-// Of light paths, in which threads take them.
-uint32_t piece_count(const PassSettings& pass) {
-    return pass.traces_light() ? (pass.light_paths + k_paths_per_piece - 1) / k_paths_per_piece : 0;
+uint32_t pieces_of(uint32_t paths) { return (paths + k_paths_per_piece - 1) / k_paths_per_piece; }
+
+// Of the light paths that leave VLPs, in which threads take them.
+uint32_t piece_count(const PassSettings& pass) { return pass.traces_light() ? pieces_of(pass.light_paths) : 0; }
+
+// Of those that only splat.
+uint32_t splat_piece_count(const PassSettings& pass) {
+    return pass.traces_light() ? pieces_of(pass.splat_paths() - pass.light_paths) : 0;
 }
 
 // The size of the table of groups, with V at its end.
@@ -103,7 +108,7 @@ public:
     bool run_iteration(uint32_t iteration, Film& film, const std::atomic<bool>& stop) override {
         const auto pieces = static_cast<uint32_t>(vertices_in_piece_.size());
         counters.work_done = 0;
-        counters.work_total = pieces + static_cast<uint32_t>(tiles_.size());
+        counters.work_total = pieces + splat_piece_count(pass_) + static_cast<uint32_t>(tiles_.size());
         for_rows(film, [&](uint32_t begin, uint32_t end) { film.clear_splats(begin, end); });
         if (plan_.due()) plan_samples();
         const SampleRates rates = plan_.rates(iteration, plan_.levels().data(), moments_.data());
@@ -153,19 +158,25 @@ private:
     // path had L slots of its own, so that more of it stays in the caches.
     uint32_t first_slot(uint32_t piece) const { return piece * k_paths_per_piece * pass_.light_path_length; }
 
-    // Traces all light paths, whose vertices are kept only where they serve as VLPs.
+    // Traces all light paths. Their vertices are kept only where they serve as VLPs.
     void run_light_pass(uint32_t iteration, Film& film, const std::atomic<bool>& stop) {
-        pool_.run(static_cast<uint32_t>(vertices_in_piece_.size()), [&](uint32_t piece) {
+        const auto pieces = static_cast<uint32_t>(vertices_in_piece_.size());
+        pool_.run(pieces + splat_piece_count(pass_), [&](uint32_t piece) {
             if (stop) return;
             LightVertex path_alone[k_max_walk];
             SplatSink<AtomicAdd> sink{pass_, film.window(), film.splats().data(), film.point_splats().data(), {}};
+            const bool leaves_vlps = piece < pieces;
+            const uint32_t begin =
+                leaves_vlps ? piece * k_paths_per_piece : pass_.light_paths + (piece - pieces) * k_paths_per_piece;
+            const uint32_t end =
+                std::min(begin + k_paths_per_piece, leaves_vlps ? pass_.light_paths : pass_.splat_paths());
+            const bool keeps = leaves_vlps && has_vlps();
             uint32_t vertices = 0;
-            const uint32_t end = std::min((piece + 1) * k_paths_per_piece, pass_.light_paths);
-            for (uint32_t path = piece * k_paths_per_piece; path < end; ++path) {
-                LightVertex* slots = has_vlps() ? slots_.data() + first_slot(piece) + vertices : path_alone;
+            for (uint32_t path = begin; path < end; ++path) {
+                LightVertex* slots = keeps ? slots_.data() + first_slot(piece) + vertices : path_alone;
                 vertices += trace_light_path(scene_, pass_, k_light_stream, iteration, path, slots, sink);
             }
-            vertices_in_piece_[piece] = vertices;
+            if (leaves_vlps) vertices_in_piece_[piece] = vertices;
             count_dropped(sink.dropped);
             counters.work_done.fetch_add(1, std::memory_order_relaxed);
         });

@@ -54,7 +54,7 @@ public:
         if (plan_.due()) plan_samples();
         const SampleRates rates = plan_.rates(iteration, levels_.data(), moments_.data());
         counters.work_done = 0;
-        counters.work_total = pixels() + (pass_.traces_light() ? pass_.light_paths : 0);
+        counters.work_total = pixels() + (pass_.traces_light() ? pass_.splat_paths() : 0);
         if (pass_.traces_light() && !run_light_pass(iteration, stop)) return false;
         const bool has_vlps = pass_.kappa > 0;
         const EyePass eye{
@@ -310,12 +310,19 @@ private:
             device_.clear(splats_.data(), splats_.bytes());
             device_.clear(point_splats_.data(), point_splats_.bytes());
         }
-        const LightPass light{scene_,         pass_,
-                              iteration,      window_,
-                              slots_.data(),  vertices_in_path_.data(),
-                              splats_.data(), point_splats_.data(),
-                              counts_.data()};
-        if (!launch_in_batches(pass_.light_paths, light, stop)) return false;
+        LightPass light{scene_,
+                        pass_,
+                        iteration,
+                        pass_.light_rounds,
+                        window_,
+                        slots_.data(),
+                        vertices_in_path_.data(),
+                        splats_.data(),
+                        point_splats_.data(),
+                        counts_.data()};
+        while (light.round-- > 0) {  // the first comes last, as its vertices are VLPs
+            if (!launch_in_batches(pass_.light_paths, light, stop)) return false;
+        }
         if (!(pass_.kappa > 0)) return true;
         list_stored();
         return true;

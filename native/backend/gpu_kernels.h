@@ -15,11 +15,11 @@ struct PassCounts {
     uint64_t stored_vlps = 0;  // V of the last light pass
 };
 
-// Traces light path `path` into its own L slots.
+// Traces light path `path` of a round into its own L slots.
 struct LightPass {
     SceneView scene;
     PassSettings pass;
-    uint32_t iteration;
+    uint32_t iteration, round;
     Window window;
     LightVertex* slots;
     uint8_t* vertices_in_path;
@@ -29,7 +29,8 @@ struct LightPass {
     VLP_HD void operator()(uint32_t path) const {
         LightVertex* own = slots + static_cast<size_t>(path) * pass.light_path_length;
         SplatSink<AtomicAdd> sink{pass, window, splats, point_splats, {}};
-        const uint32_t vertices = trace_light_path(scene, pass, k_light_stream, iteration, path, own, sink);
+        const uint32_t vertices =
+            trace_light_path(scene, pass, k_light_stream, iteration, round * pass.light_paths + path, own, sink);
         vertices_in_path[path] = static_cast<uint8_t>(vertices);
         if (sink.dropped > 0) AtomicAdd{}(counts->dropped, sink.dropped);
     }

@@ -113,7 +113,7 @@ PassSettings pass_of(const std::shared_ptr<Scene>& scene, const nb::dict& settin
 
 // In one iteration.
 uint32_t traced_light_paths(const Renderer& renderer) {
-    return renderer.pass().traces_light() ? renderer.pass().light_paths : 0;
+    return renderer.pass().traces_light() ? renderer.pass().splat_paths() : 0;
 }
 
 // {device: {part: bytes}} without what takes none.
@@ -170,16 +170,17 @@ void bind_renderer(nb::module_& m) {
                  const auto threads = get<uint32_t>(settings, "threads");
                  const IterationRange iterations = range_of(settings);
                  nb::gil_scoped_release release;
-                 PassSettings pass = for_scene(scene->view(), asked);
+                 PassSettings pass = for_scene(scene->view(), asked, threads);
                  Devices made = make_devices(device, *scene, pass, threads);
                  new (self) Renderer(scene, pass, scene->window(), std::move(made), iterations.first, iterations.end);
              })
         .def("update",
              [](Renderer& r, std::shared_ptr<Scene> scene, const nb::dict& settings) {
                  const PassSettings asked = pass_of(scene, settings);
+                 const auto threads = get<uint32_t>(settings, "threads");
                  const IterationRange iterations = range_of(settings);
                  nb::gil_scoped_release release;
-                 r.update(scene, for_scene(scene->view(), asked), iterations.first, iterations.end);
+                 r.update(scene, for_scene(scene->view(), asked, threads), iterations.first, iterations.end);
              })
         .def("iterate", &Renderer::iterate, nb::arg("count"), nb::call_guard<nb::gil_scoped_release>())
         .def("cancel", &Renderer::cancel)
@@ -227,6 +228,7 @@ void bind_renderer(nb::module_& m) {
         .def_prop_ro("eye_form", [](const Renderer& r) { return k_eye_form_names[static_cast<size_t>(r.eye_form())]; })
         .def_prop_ro("eye_samples", [](const Renderer& r) { return r.eye_samples(); })
         .def_prop_ro("light_paths", &traced_light_paths)
+        .def_prop_ro("light_rounds", [](const Renderer& r) { return r.pass().light_rounds; })
         .def_prop_ro("paths",
                      [](const Renderer& r) {
                          return r.iteration_count() * (r.film().window().pixel_count() + traced_light_paths(r));
@@ -253,10 +255,11 @@ void bind_renderer(nb::module_& m) {
     m.def("plan_memory", [](const std::shared_ptr<Scene>& scene, const nb::dict& settings) {
         const PassSettings asked = pass_of(scene, settings);
         const auto device = get<std::string>(settings, "device");
+        const auto threads = get<uint32_t>(settings, "threads");
         MemoryByDevice plan;
         {
             nb::gil_scoped_release release;
-            plan = plan_memory(device, *scene, for_scene(scene->view(), asked));
+            plan = plan_memory(device, *scene, for_scene(scene->view(), asked, threads));
         }
         return to_python(plan);
     });

@@ -8,6 +8,7 @@
 namespace vlp {
 
 // A light that the walk's ray met at y_0 = z_{t-1}, seen from the walk's last vertex z_{t-2} (strategy s = 0).
+template <typename Sum>
 VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye,
                                      Rgb throughput, float pdf_solid_angle, uint32_t light_index, Vec3 position,
                                      Vec3 normal, Vec3 direction) {
@@ -26,12 +27,13 @@ VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings&
         is_infinite(light) ? pdf_solid_angle : pdf_solid_angle * abs_dot(normal, direction) / dist_squared;
     const float next_event = pdf_next_event_from(scene, light_index, x_1, position, normal, direction);
     const LightEnd end = light_end(scene, light_index, position, normal, direction, dist_squared, next_event);
-    StrategySum sum = strategy_sum(pass, strategy_count(pass, 0));
-    if (!eye.last().specular) sum.add(end.pdf_next_event / eye_pdf, strategy_count(pass, 1));
+    Sum sum = strategy_sum<Sum>(pass, strategy_count(pass, 0));
+    if (!eye.last().specular) sum.add(end.pdf_next_event / eye_pdf, strategy_count(pass, 1), false);
     const float cos_x_1 = abs_dot(x_1.geometric_normal, direction);
     const float ratio = end.pdf_emission / eye_pdf * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
     add_longer_light_walks(sum, pass, eye.vertices, t, 2, ratio, eye.last().rev_ratio);
     c.weight = sum.weight();
+    c.connection_share = sum.connection_share();
     return c;
 }
 
@@ -73,8 +75,8 @@ struct LightHits {
 
 private:
     VLP_HD void add(uint32_t light, Vec3 position, Vec3 normal, Rgb through) const {
-        sink.add(
-            hit_light(scene, pass, eye, eye.throughput * through, pdf_solid_angle, light, position, normal, direction));
+        sink.add(hit_light<typename SumFor<Sink>::Type>(scene, pass, eye, eye.throughput * through, pdf_solid_angle,
+                                                        light, position, normal, direction));
     }
 };
 

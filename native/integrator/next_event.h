@@ -36,9 +36,9 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
 
     const uint32_t n = eye.t + 1;
     const float dist_squared = event.distance * event.distance;
-    StrategySum sum = strategy_sum(pass, strategy_count(pass, 1));
+    auto sum = strategy_sum<typename SumFor<See>::Type>(pass, strategy_count(pass, 1));
     if (!event.delta && n <= pass.eye_path_length + 1) {
-        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0));
+        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0), false);
     }
     if (pass.traces_light() && (eye.t > 2 || pass.splats)) {
         const LightEnd end =
@@ -47,6 +47,7 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
         add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, at_x_1.pdf_eye * eye.last().rev_geometry);
     }
     found.weight = sum.weight();
+    found.connection_share = sum.connection_share();
     return found;
 }
 

@@ -22,7 +22,8 @@ struct VlpGrid {
 struct PassSettings {
     uint32_t light_path_length = 1;  // L: most surface hits of a light path, at most k_max_walk
     uint32_t eye_path_length = 5;    // K: most surface hits of an eye path, at most k_max_walk
-    uint32_t light_paths = 0;        // N
+    uint32_t light_paths = 0;        // N: leave VLPs
+    uint32_t light_rounds = 1;       // R: so many times N light paths splat, and the first N of them leave VLPs
     uint32_t vlp_connections = 1;    // C
     uint32_t vlp_candidates = 1;     // M: VLPs that each connection chooses from
     uint32_t light_samples = 1;      // S
@@ -44,6 +45,7 @@ struct PassSettings {
     // The limit on what a path of n vertices adds: direct light has met one surface at most.
     VLP_HD float clamp_of(uint32_t n) const { return n <= 3 ? clamp_direct : clamp_indirect; }
 
+    VLP_HD uint32_t splat_paths() const { return light_rounds * light_paths; }
     // Whether an iteration has a light pass.
     VLP_HD bool traces_light() const { return kappa > 0 || splats; }
 };

@@ -180,6 +180,8 @@ VLP_HD VLP_FORCE_INLINE bool go_on(const SceneView& scene, const PassSettings& p
 // Looks at once whether the ends of connections see each other.
 template <typename Sink>
 struct JoinNow {
+    using Sum = typename SumFor<Sink>::Type;
+
     const SceneView& scene;
     Sink& sink;
 

@@ -1,7 +1,7 @@
 // Joining a light path's vertex to the lens: strategies with t = 1, whose light falls on any pixel of the film.
 //
-// A vertex y_{s-1} of throughput beta adds beta f |cos| pixels_per_area h(film - pixel centre) / N to every pixel whose
-// filter h it meets (see camera/projection.h). N light paths serve the whole film, whatever part of it is rendered.
+// A vertex y_{s-1} of throughput beta adds beta f |cos| pixels_per_area h(film - pixel centre) / (R N) to every pixel whose
+// filter h it meets (see camera/projection.h). R N light paths serve the whole film, whatever part of it is rendered.
 #pragma once
 
 #include "camera/projection.h"
@@ -40,10 +40,11 @@ VLP_HD inline void connect_to_lens(const SceneView& scene, const PassSettings& p
     const float eye_pdf = seen.pixels_per_area * abs_dot(point.geometric_normal, seen.direction);
     const uint32_t s = y.index() + 1;
     Splat splat{{.s = s, .t = 1, .vlp = &y}, seen.film};
-    splat.found.value = y.throughput * at_y.f * through * (eye_pdf / static_cast<float>(pass.light_paths));
-    StrategySum sum = strategy_sum(pass, splat_count(pass, s));
+    splat.found.value = y.throughput * at_y.f * through * (eye_pdf / static_cast<float>(pass.splat_paths()));
+    auto sum = strategy_sum<typename SumFor<Sink>::Type>(pass, splat_count(pass, s));
     add_shorter_light_walks(sum, pass, &y, s, s + 1, eye_pdf / y.pdf_area, at_y.pdf_light * y.rev_geometry);
     splat.found.weight = sum.weight();
+    splat.found.connection_share = sum.connection_share();
     sink.add(splat);
 }
 
@@ -102,9 +103,9 @@ struct SplatSink {
             ++dropped;
             return;
         }
-        // An iteration has at most N L splats, which together must not overflow.
+        // An iteration has at most R N L splats, which together must not overflow.
         const float most =
-            0x1p62f / (static_cast<float>(pass.light_paths) * static_cast<float>(pass.light_path_length));
+            0x1p62f / (static_cast<float>(pass.splat_paths()) * static_cast<float>(pass.light_path_length));
         float total = 0;
         for_each_pixel(pass, window, splat.film, [&](uint32_t x, uint32_t y, float h) {
             add_to(sums, x, y, clamped(pass, splat.found.s + 1, weighted * h), most);

@@ -25,6 +25,9 @@ struct Contribution {
     uint32_t s = 0, t = 0;
     Rgb value{};
     float weight = 0;
+    // Told to sinks that want a ConnectionSum: what connections have of all strategies that could have made the path, and how
+    // many draws this one stands for, as it is kept from several.
+    float connection_share = 0, draws = 1;
     uint32_t light = k_none;  // s < 2: the light, and the point y_0 (the direction to it where it is infinite)
     Vec3 position{}, normal{};
     const LightVertex* vlp = nullptr;  // s >= 2: y_{s-1}
@@ -42,18 +45,19 @@ VLP_HD inline SurfacePoint surface_of(const LightVertex& vlp) {
     return p;
 }
 
-// The weight of joining z_{t-1} to a VLP by `edge`, which runs from the eye vertex; both BSDFs as evaluated along it.
-VLP_HD inline float connection_weight(const PassSettings& pass, const EyeWalk& eye, const LobeValue& at_eye,
-                                      const LightVertex* vlp, const LobeValue& at_vlp, const Edge& edge, float cos_eye,
-                                      float cos_vlp) {
+// For the weight of joining z_{t-1} to a VLP by `edge`, which runs from the eye vertex; both BSDFs as evaluated along it.
+template <typename Sum>
+VLP_HD inline Sum connection_sum(const PassSettings& pass, const EyeWalk& eye, const LobeValue& at_eye,
+                                 const LightVertex* vlp, const LobeValue& at_vlp, const Edge& edge, float cos_eye,
+                                 float cos_vlp) {
     const uint32_t s = vlp->index() + 1, n = s + eye.t;
-    StrategySum sum = strategy_sum(pass, strategy_count(pass, s));
+    Sum sum = strategy_sum<Sum>(pass, strategy_count(pass, s), true);
     const float light_pdf = at_vlp.pdf_eye * cos_eye / edge.dist_squared;
     add_longer_light_walks(sum, pass, eye.vertices, n, s + 1, light_pdf / eye.last().pdf_area,
                            at_eye.pdf_eye * eye.last().rev_geometry);
     const float eye_pdf = at_eye.pdf_light * cos_vlp / edge.dist_squared;
     add_shorter_light_walks(sum, pass, vlp, s, n, eye_pdf / vlp->pdf_area, at_vlp.pdf_light * vlp->rev_geometry);
-    return sum.weight();
+    return sum;
 }
 
 // A connection of z_{t-1} to a VLP, as long as nothing stands between them.
@@ -64,6 +68,7 @@ struct VlpConnection {
 };
 
 // With nothing between.
+template <typename Sum = StrategySum>
 VLP_HD inline VlpConnection join_unshadowed(const SceneView& scene, const PassSettings& pass,
                                             const LightVertexCache& cache, const EyeWalk& eye, const Bsdf& eye_bsdf,
                                             VlpChoice choice) {
@@ -84,7 +89,12 @@ VLP_HD inline VlpConnection join_unshadowed(const SceneView& scene, const PassSe
 
     const float paths = choice.stands_for / static_cast<float>(pass.light_paths);
     found.value = eye.throughput * at_eye.f * at_vlp.f * vlp->throughput * (geometry * paths);
-    found.weight = connection_weight(pass, eye, at_eye, vlp, at_vlp, edge, cos_eye, cos_vlp);
+    const Sum sum = connection_sum<Sum>(pass, eye, at_eye, vlp, at_vlp, edge, cos_eye, cos_vlp);
+    found.weight = sum.weight();
+    found.connection_share = sum.connection_share();
+    if constexpr (std::is_same_v<Sum, ConnectionSum>) {
+        found.draws = choice.stands_for / static_cast<float>(cache.hand_count);
+    }
     return joined;
 }
 
@@ -116,7 +126,7 @@ VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, c
                                                        const LightVertexCache& cache, const EyeWalk& eye,
                                                        const Bsdf& eye_bsdf, VlpChoice choice, See& see) {
     if (!(choice.stands_for > 0)) return {.t = eye.t};
-    VlpConnection joined = join_unshadowed(scene, pass, cache, eye, eye_bsdf, choice);
+    VlpConnection joined = join_unshadowed<typename SumFor<See>::Type>(scene, pass, cache, eye, eye_bsdf, choice);
     if (is_black(joined.found.value)) return joined.found;
     const Rgb through = see(shadow_ray(anchor_of(eye.surface), joined.vlp, joined.direction));
     joined.found.value *= 1.0f / static_cast<float>(pass.vlp_connections);

@@ -13,6 +13,8 @@
 // one whatever the pixel.
 #pragma once
 
+#include <type_traits>
+
 #include "integrator/pass.h"
 #include "integrator/path_vertex.h"
 
@@ -35,9 +37,9 @@ VLP_HD inline bool splats_from(const PassSettings& pass, uint32_t i) {
     return pass.splats && (i > 1 || pass.light_samples == 0);
 }
 
-// Strategies (s, 1): each of N light paths may splat on the pixel.
+// Strategies (s, 1): each of R N light paths may splat on the pixel.
 VLP_HD inline float splat_count(const PassSettings& pass, uint32_t s) {
-    return splats_from(pass, s - 1) ? static_cast<float>(pass.light_paths) : 0.0f;
+    return splats_from(pass, s - 1) ? static_cast<float>(pass.splat_paths()) : 0.0f;
 }
 
 // Sums what the other strategies have relative to the one at hand.
@@ -47,7 +49,7 @@ struct StrategySum {
     float sum = 1;
 
     // `ratio` = density of the other strategy over the density of this one, without the counts.
-    VLP_HD void add(float ratio, float count) {
+    VLP_HD void add(float ratio, float count, bool = false) {
         const float relative = ratio * count / own_count;
         switch (weighting) {
             case Weighting::uniform:
@@ -62,41 +64,75 @@ struct StrategySum {
         }
     }
     VLP_HD float weight() const { return 1.0f / sum; }
+    VLP_HD float connection_share() const { return 0; }  // nobody asks
 };
 
-VLP_HD inline StrategySum strategy_sum(const PassSettings& pass, float own_count) {
-    return {pass.weighting, own_count};
+// The same, with what connections to VLPs have of it.
+struct ConnectionSum {
+    StrategySum all;
+    float connections;
+
+    VLP_HD void add(float ratio, float count, bool is_connection) {
+        const float before = all.sum;
+        all.add(ratio, count);
+        if (is_connection) connections += all.sum - before;
+    }
+    VLP_HD float weight() const { return all.weight(); }
+    VLP_HD float connection_share() const { return connections / all.sum; }
+};
+
+// The one that a sink of contributions asks for as its `Sum`; by default only weights.
+template <typename Sink>
+struct SumFor {
+    using Type = StrategySum;
+};
+template <typename Sink>
+    requires requires { typename Sink::Sum; }
+struct SumFor<Sink> {
+    using Type = typename Sink::Sum;
+};
+
+template <typename Sum = StrategySum>
+VLP_HD inline Sum strategy_sum(const PassSettings& pass, float own_count, [[maybe_unused]] bool is_connection = false) {
+    const StrategySum own{pass.weighting, own_count};
+    if constexpr (std::is_same_v<Sum, ConnectionSum>) {
+        return {own, is_connection ? 1.0f : 0.0f};
+    } else {
+        return own;
+    }
 }
 
 // Adds strategies k_first, k_first + 1, ...: eye vertices become light vertices, from the light's end of the eye walk on.
 // `eye` holds z_0 ... z_{t-1} = x_{n-1} ... x_{n-t}; `ratio` is p_{k_first} over the density at hand without counts, and
 // `next_ratio` is light / eye density of x_{k_first}, which the connection at hand decides; further ones are in `eye`.
-VLP_HD inline void add_longer_light_walks(StrategySum& sum, const PassSettings& pass, const VertexDensity* eye,
-                                          uint32_t n, uint32_t k_first, float ratio, float next_ratio) {
+template <typename Sum>
+VLP_HD inline void add_longer_light_walks(Sum& sum, const PassSettings& pass, const VertexDensity* eye, uint32_t n,
+                                          uint32_t k_first, float ratio, float next_ratio) {
     const uint32_t t_least = pass.splats ? 1 : 2;
     for (uint32_t k = k_first; k <= pass.light_path_length + 1 && k + t_least <= n && ratio > 0; ++k) {
         const VertexDensity &end = eye[n - 1 - k], &freed = eye[n - k];  // x_k and x_{k-1}
         if (!end.specular && !freed.specular)
-            sum.add(ratio, k + 1 < n ? strategy_count(pass, k) : splat_count(pass, k));
+            sum.add(ratio, k + 1 < n ? strategy_count(pass, k) : splat_count(pass, k), k + 1 < n);
         ratio *= k == k_first ? next_ratio : freed.rev_ratio;
     }
 }
 
 // Adds strategies s - 1, s - 2, ..., 0: light vertices become eye vertices, from the light vertex `vlp` = y_{s-1} back to
 // the light. `ratio` is eye / light density of the VLP and `next_ratio` of the vertex before it, as connected.
-VLP_HD inline void add_shorter_light_walks(StrategySum& sum, const PassSettings& pass, const LightVertex* vlp,
-                                           uint32_t s, uint32_t n, float ratio, float next_ratio) {
+template <typename Sum>
+VLP_HD inline void add_shorter_light_walks(Sum& sum, const PassSettings& pass, const LightVertex* vlp, uint32_t s,
+                                           uint32_t n, float ratio, float next_ratio) {
     const LightVertex* freed = vlp;  // x_k = y_k, free of the light walk from strategy k on
     for (uint32_t k = s - 1; n - k <= pass.eye_path_length + 1 && ratio > 0; --k, --freed) {
         if (k == 0) {  // y_0 has no slot: `freed` must not be looked at
-            sum.add(ratio, strategy_count(pass, 0));
+            sum.add(ratio, strategy_count(pass, 0), false);
             return;
         }
         const bool finite = freed == vlp || !freed->specular();
         if (k == 1) {
-            if (finite) sum.add(ratio * freed->next_event_ratio, strategy_count(pass, 1));
+            if (finite) sum.add(ratio * freed->next_event_ratio, strategy_count(pass, 1), false);
         } else if (finite && !freed[-1].specular()) {
-            sum.add(ratio, strategy_count(pass, k));
+            sum.add(ratio, strategy_count(pass, k), true);
         }
         ratio *= freed == vlp ? next_ratio : freed->rev_ratio;
     }

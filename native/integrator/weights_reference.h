@@ -165,7 +165,7 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
         if (k == 1 && x_1.specular) continue;
         if (k >= 2 && (path.x[k - 1].specular || path.x[k].specular)) continue;
         double density = k == 0 ? 0.5 : k == 1 ? double(pass.light_samples) : double{pass.kappa};
-        if (k > 0 && k == n - 1) density = double(pass.light_paths);
+        if (k > 0 && k == n - 1) density = double(pass.splat_paths());
         for (uint32_t i = 0; i < n; ++i) density *= i >= k ? by_eye[i] : k == 1 ? next_event : by_light[i];
         densities[k] = density;
     }

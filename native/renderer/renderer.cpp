@@ -1,61 +1,14 @@
-// Iterations, the pilot that fixes kappa, deadlines and cancellation.
+// Iterations, deadlines and cancellation.
 #include "renderer/renderer.h"
 
 #include <algorithm>
-#include <cmath>
 #include <span>
 #include <stdexcept>
 #include <utility>
 
-#include "integrator/light_tracing.h"
 #include "scene/scene.h"
 
 namespace vlp {
-
-Pilot trace_pilot(const SceneView& scene, const PassSettings& pass) {
-    constexpr uint32_t k_pilot_paths = 4096;
-    std::vector<LightVertex> slots(pass.light_path_length);
-    double stored = 0, sum[3]{}, squares[3]{};
-    for (uint32_t path = 0; path < k_pilot_paths; ++path) {
-        NoSplats none;
-        const uint32_t vertices = trace_light_path(scene, pass, k_pilot_stream, 0, path, slots.data(), none);
-        for (const LightVertex& vlp : std::span(slots).first(vertices)) {
-            if (!vlp.connectible()) continue;
-            ++stored;
-            for (int axis = 0; axis < 3; ++axis) {
-                const double x = (&vlp.position.x)[axis];
-                sum[axis] += x, squares[axis] += x * x;
-            }
-        }
-    }
-    Pilot pilot{static_cast<float>(stored / k_pilot_paths), {}};
-    if (stored == 0) return pilot;
-    double half[3];
-    for (int axis = 0; axis < 3; ++axis) {
-        const double mean = sum[axis] / stored;
-        half[axis] = std::sqrt(3 * std::max(squares[axis] / stored - mean * mean, 0.0));
-        (&pilot.grid.low.x)[axis] = static_cast<float>(mean - half[axis]);
-    }
-    // Across a plane rounding alone would choose the cell.
-    const double least = std::max(1e-4 * *std::max_element(half, half + 3), 1e-30);
-    for (int axis = 0; axis < 3; ++axis) {
-        if (half[axis] > least) (&pilot.grid.cells_per_metre.x)[axis] = static_cast<float>(2 / half[axis]);
-    }
-    return pilot;
-}
-
-PassSettings for_scene(const SceneView& scene, PassSettings pass) {
-    const bool light_walks = pass.light_path_length > 0 && pass.light_paths > 0 && scene.light_count > 0;
-    pass.splats &= light_walks;
-    pass.kappa = 0;
-    if (pass.vlp_connections > 0 && light_walks) {
-        const Pilot pilot = trace_pilot(scene, pass);
-        if (pilot.vlps_per_path > 0)
-            pass.kappa = static_cast<float>(pass.vlp_connections * pass.vlp_candidates) / pilot.vlps_per_path;
-        pass.vlp_grid = pilot.grid;
-    }
-    return pass;
-}
 
 namespace {
 

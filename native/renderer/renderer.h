@@ -14,6 +14,7 @@
 #include "backend/backend.h"
 #include "renderer/helper.h"
 #include "renderer/iterations.h"
+#include "renderer/pilot.h"
 
 namespace vlp {
 
@@ -101,18 +102,5 @@ private:
     std::atomic<bool> stop_{false};
     std::chrono::steady_clock::time_point deadline_ = std::chrono::steady_clock::time_point::max();
 };
-
-// The settings with what the scene makes of them: kappa and the VLPs' grid, from a pilot light pass, and splats only where
-// there are light paths.
-PassSettings for_scene(const SceneView& scene, PassSettings pass);
-
-// What light paths of a stream of their own find: the same on every machine.
-struct Pilot {
-    float vlps_per_path = 0;
-    // Four cells along each axis, over sqrt(3) standard deviations on either side of the mean: all VLPs, were they even. One
-    // along an axis on which they hardly spread.
-    VlpGrid grid;
-};
-Pilot trace_pilot(const SceneView& scene, const PassSettings& pass);
 
 }  // namespace vlp

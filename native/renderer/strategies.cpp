@@ -37,8 +37,17 @@ struct StrategyRenderer::LightSink {
     }
 };
 
+// Each of them as often in every pixel, whether it pays or not.
+PassSettings for_all_strategies(const SceneView& scene, PassSettings pass) {
+    pass.adaptive = false;
+    return for_scene(scene, pass);
+}
+
 StrategyRenderer::StrategyRenderer(std::shared_ptr<const Scene> scene, const PassSettings& pass, unsigned threads)
-    : scene_(std::move(scene)), pass_(for_scene(scene_->view(), pass)), window_(scene_->window()), pool_(threads) {
+    : scene_(std::move(scene)),
+      pass_(for_all_strategies(scene_->view(), pass)),
+      window_(scene_->window()),
+      pool_(threads) {
     if (pass_.traces_light()) slots_.resize(light_vertex_capacity(pass_));
     stored_.resize(candidate_capacity(pass_));
     sums_.resize(image(most_light_vertices() + 1, 0, false));

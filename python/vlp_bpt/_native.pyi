@@ -140,6 +140,8 @@ class Renderer:
     @property
     def light_paths(self) -> int: ...  # of one iteration; 0 where nothing needs them
     @property
+    def light_rounds(self) -> int: ...  # R: how many times the paths that leave VLPs
+    @property
     def paths(self) -> int: ...
     @property
     def ranges(self) -> dict[int, int]: ...  # of iterations done: end by begin

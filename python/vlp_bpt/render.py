@@ -52,7 +52,9 @@ class Progress:
 @dataclass(frozen=True)
 class Statistics:
     """What a render did and took. eye_samples and light_paths: in all; memory: bytes by device and part; dropped:
-    non-finite samples left out; eye_form: of the eye pass, "paths" or "wavefront" (native/backend/eye_form.h);
+    non-finite samples left out; light_rounds: how many times as many light paths were joined to the lens as left
+    virtual light points; connects: eye paths were joined to these (adaptive sampling chooses both, see
+    `RenderSettings`); eye_form: of the eye pass, "paths" or "wavefront" (native/backend/eye_form.h);
     build_seconds: uploading the scene and building its hierarchy, as far as it changed; denoise_seconds: of denoising
     the last picture, not part of seconds; noise: of the picture before denoising, as `vlp_bpt.noise` measures it, None
     without `noise_threshold` and before it was told."""
@@ -65,6 +67,8 @@ class Statistics:
     vlps: int
     dropped: int
     memory: dict[str, dict[str, int]]
+    light_rounds: int = 1
+    connects: bool = True
     eye_form: str = "paths"
     denoise_seconds: float = 0.0
     noise: float | None = None
@@ -188,6 +192,8 @@ class Renderer:
             vlps=int(self._native.vlps),
             dropped=int(self._native.dropped),
             memory=self.memory,
+            light_rounds=int(self._native.light_rounds),
+            connects=self._native.kappa > 0,
             eye_form=self._native.eye_form,
             denoise_seconds=self._denoise_seconds,
             noise=self._noise.noise,
@@ -320,8 +326,9 @@ class Renderer:
 
         statistics = asdict(self.statistics)
         settings = self.settings.to_dict()
-        if 0 < self._native.light_paths < settings["light_paths"]:
-            settings["light_paths"] = int(self._native.light_paths)  # a GPU had no room for more
+        light_paths = int(self._native.light_paths) // statistics["light_rounds"]
+        if 0 < light_paths < settings["light_paths"]:
+            settings["light_paths"] = light_paths  # a GPU had no room for more
         return {
             "version": __version__,
             "settings": settings,
@@ -330,6 +337,8 @@ class Renderer:
             "seconds": round(self._seconds, 3),
             "seed": self.settings.seed,
             "eye_form": statistics["eye_form"],
+            "light_rounds": statistics["light_rounds"],
+            "connects": statistics["connects"],
             "film": {"width": self.film.width, "height": self.film.height, "window": list(self.film.render_window)},
             "statistics": {name: statistics[name] for name in ("eye_samples", "light_paths", "dropped")},
         } | ({} if self._noise.noise is None else {"noise": self._noise.noise})

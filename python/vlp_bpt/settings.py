@@ -124,8 +124,10 @@ class RenderSettings:
     would bring if nothing stood between. light_samples: S, light samples at one eye vertex. splats: light paths are
     joined to the lens. roulette: paths end at random, the dimmer the sooner, and those that go on make up for it; else
     all of them go on up to L and K. adaptive: from the fifth iteration on, iterations take more samples in pixels that
-    are noisier and fewer in others, one a pixel on average; without bias (native/film/sample_rates.h). hits: eye paths
-    that meet a light count.
+    are noisier and fewer in others, one a pixel on average; without bias (native/film/sample_rates.h). And
+    where a trial of the scene finds that it pays (native/renderer/trial.h), up to eight times `light_paths` are joined
+    to the lens, and eye paths are not joined to virtual light points; they may then be as long as both kinds together.
+    hits: eye paths that meet a light count.
     clamp_direct, clamp_indirect: the most that one find of light after at most one surface, or after more, may add to
     a pixel (mean of its channels); 0: no limit. Clamping removes bright specks and the light in them: it is a bias.
     denoise: the finished picture is denoised by Open Image Denoise, guided by colours and normals that the eye paths

@@ -36,12 +36,15 @@ inline std::vector<NamedPass> passes() {
     PassSettings many = balanced();
     many.light_path_length = many.eye_path_length = k_max_walk;
     many.vlp_connections = 2, many.vlp_candidates = 3, many.light_samples = 0;
+    PassSettings rounds = balanced(300);
+    rounds.light_rounds = 3;
     PassSettings guided = balanced(), guided_alone = path_tracing;
     guided.guides = guided_alone.guides = true;
     return {{"paper", paper},
             {"guided", guided},
             {"guided_path_tracing", guided_alone},
             {"balanced", balanced()},
+            {"rounds", rounds},
             {"splats_alone", splats_alone},
             {"path_tracing", path_tracing},
             {"many", many}};

@@ -14,6 +14,8 @@ namespace vlp::test {
 
 // Keeps the splats that fall on the film, each with its share of every pixel added up.
 struct SplatRecorder {
+    using Sum = ConnectionSum;
+
     const SceneView& scene;
     const PassSettings& pass;
     struct Found {
@@ -40,15 +42,15 @@ struct TracedLight {
     LightVertexCache cache;
 
     TracedLight(const SceneView& scene, const PassSettings& pass, uint32_t iteration)
-        : slots(size_t{pass.light_paths} * pass.light_path_length) {
+        : slots(size_t{pass.splat_paths()} * pass.light_path_length) {
         SplatRecorder recorder{scene, pass};
-        for (uint32_t p = 0; p < pass.light_paths && pass.light_path_length > 0; ++p) {
+        for (uint32_t p = 0; p < pass.splat_paths() && pass.light_path_length > 0; ++p) {
             LightVertex* first = &slots[size_t{p} * pass.light_path_length];
             trace_light_path(scene, pass, k_light_stream, iteration, p, first, recorder);
         }
         splats = std::move(recorder.found);
         std::vector<uint32_t> connectible;
-        for (uint32_t i = 0; i < slots.size(); ++i) {
+        for (uint32_t i = 0; i < size_t{pass.light_paths} * pass.light_path_length; ++i) {
             if (slots[i].connectible()) connectible.push_back(i);
         }
         const auto count = static_cast<uint32_t>(connectible.size());
@@ -63,8 +65,9 @@ struct TracedLight {
 };
 
 inline PassSettings with_kappa(const SceneView& scene, PassSettings pass) {
+    ThreadPool pool(1);
     const float per_path =
-        pass.light_path_length > 0 && pass.light_paths > 0 ? trace_pilot(scene, pass).vlps_per_path : 0.0f;
+        pass.light_path_length > 0 && pass.light_paths > 0 ? trace_pilot(scene, pass, pool).vlps_per_path : 0.0f;
     pass.kappa = per_path > 0 ? static_cast<float>(pass.vlp_connections) / per_path : 0.0f;
     return pass;
 }
@@ -146,6 +149,8 @@ inline void complete(const SceneView& scene, reference::Path& path) {
 // A sink of trace_eye_path that calls on_path(Path, Contribution) for everything found that is not black.
 template <typename F>
 struct PathRecorder {
+    using Sum = ConnectionSum;
+
     const SceneView& scene;
     const PassSettings& pass;
     const LightVertexCache& cache;

@@ -142,7 +142,8 @@ TEST(Pilot, TheGridIsWhereTheLightFalls) {
     scene.build(1);
     PassSettings pass;
     pass.light_paths = 100, pass.light_path_length = 1;
-    const Pilot pilot = trace_pilot(scene.view(), pass);
+    ThreadPool pool(2);
+    const Pilot pilot = trace_pilot(scene.view(), pass, pool);
     EXPECT_GT(pilot.vlps_per_path, 0.1f);
     EXPECT_LE(pilot.vlps_per_path, 1);
     EXPECT_NEAR(pilot.grid.low.x, 9, 0.1);

@@ -57,7 +57,8 @@ def test_it_is_the_same_picture_with_less_noise() -> None:
 
 
 def test_the_first_iterations_are_those_without_it() -> None:
-    first, without = rendered(4), rendered(4, adaptive=False)
+    scene = {"scene": room(24, 24)}  # where a trial chooses what a render without it does
+    first, without = rendered(4, **scene), rendered(4, adaptive=False, **scene)
     assert np.array_equal(first.film_state(), without.film_state())
     first.iterate(1), without.iterate(1)
     assert not np.array_equal(first.film_state(), without.film_state())
@@ -130,3 +131,57 @@ def test_one_pixel() -> None:
 @pytest.mark.parametrize("mode", list(Mode))
 def test_balanced_alone_has_it_by_default(mode: Mode) -> None:
     assert RenderSettings(mode=mode).resolved(8, 8).adaptive == (mode is Mode.BALANCED)
+
+
+def outdoors() -> Scene:
+    """A matt ball on a floor under a sky: light that has met two surfaces is little."""
+    return Scene(
+        [square(4.0), sphere((0, 0, 0.6), 0.5)],
+        [Instance("floor", 0, materials=(0,)), Instance("ball", 1, materials=(0,))],
+        [grey(0.5)],
+        world=World("sky", (0.2, 0.3, 0.4)),
+        camera=looking((0, -4, 2), (0, 0, 0.5), 0.9),
+        film=Film(64, 64),
+    )
+
+
+def chosen(scene: Scene, **options: Any) -> tuple[int, bool]:
+    statistics = rendered(1, scene, light_path_length=12, eye_path_length=16, **options).statistics
+    return statistics.light_rounds, statistics.connects
+
+
+def test_it_chooses_light_paths_and_connections_by_the_scene() -> None:
+    assert chosen(glass_on_a_floor(64, 64))[0] > 2, "caustics are made of splats"
+    assert not chosen(outdoors())[1]
+    assert chosen(room(64, 64))[1]
+    assert chosen(glass_on_a_floor(64, 64), adaptive=False) == chosen(outdoors(), adaptive=False) == (1, True)
+
+
+def test_the_choice_is_told() -> None:
+    renderer = rendered(3, glass_on_a_floor(64, 64))
+    rounds = renderer.statistics.light_rounds
+    assert renderer.statistics.light_paths == 3 * 200 * rounds
+    told = renderer.metadata()
+    assert (told["light_rounds"], told["connects"]) == (rounds, renderer.statistics.connects)
+    assert told["settings"]["light_paths"] == 200, "as asked"
+    assert rendered(1, outdoors(), light_path_length=12, eye_path_length=16).statistics.vlps == 0
+
+
+def test_the_same_choice_whatever_seed_and_threads() -> None:
+    kinds = {chosen(glass_on_a_floor(64, 64), threads=n, seed=n) for n in (1, 2, 3)}
+    assert len(kinds) == 1
+
+
+def test_without_connections_it_is_the_same_picture() -> None:
+    """Eye paths that go on alone find what they found joined to virtual light points."""
+    options = {"light_path_length": 6, "eye_path_length": 8, "light_paths": 500}
+    scene = outdoors()
+    scene.film = Film(16, 16)
+    with_them, without = (
+        np.array(
+            [rendered(32, scene, seed=seed, **options, **kind).read()[..., :3] for seed in range(first, first + 150)]
+        )
+        for first, kind in ((0, {}), (1000, {"adaptive": False}))
+    )
+    assert not rendered(1, scene, **options).statistics.connects
+    assert_same_mean(blocks(with_them, 2), blocks(without, 2), "without connections")

@@ -1,0 +1,114 @@
+// The pilot: light paths alone for kappa and the grid, both kinds of paths to try settings out.
+#include "renderer/pilot.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "core/parallel.h"
+#include "integrator/light_tracing.h"
+#include "renderer/trial.h"
+
+namespace vlp {
+
+namespace {
+
+// Sums over the VLPs of some light paths.
+struct PilotSums {
+    double stored = 0, position[3]{}, squares[3]{};
+};
+
+PilotSums trace_some(const SceneView& scene, const PassSettings& pass, uint32_t begin, uint32_t end) {
+    PilotSums sums;
+    std::vector<LightVertex> slots(pass.light_path_length);
+    for (uint32_t path = begin; path < end; ++path) {
+        NoSplats none;
+        const uint32_t vertices = trace_light_path(scene, pass, k_pilot_stream, 0, path, slots.data(), none);
+        for (const LightVertex& vlp : std::span(slots).first(vertices)) {
+            if (!vlp.connectible()) continue;
+            ++sums.stored;
+            for (int axis = 0; axis < 3; ++axis) {
+                const double x = (&vlp.position.x)[axis];
+                sums.position[axis] += x, sums.squares[axis] += x * x;
+            }
+        }
+    }
+    return sums;
+}
+
+}  // namespace
+
+Pilot trace_pilot(const SceneView& scene, const PassSettings& pass, ThreadPool& pool) {
+    constexpr uint32_t k_pilot_paths = 4096, k_pieces = 16, k_paths_each = k_pilot_paths / k_pieces;
+    PilotSums pieces[k_pieces];
+    pool.run(k_pieces,
+             [&](uint32_t i) { pieces[i] = trace_some(scene, pass, i * k_paths_each, (i + 1) * k_paths_each); });
+    double stored = 0, sum[3]{}, squares[3]{};
+    for (const PilotSums& piece : pieces) {
+        stored += piece.stored;
+        for (int axis = 0; axis < 3; ++axis) sum[axis] += piece.position[axis], squares[axis] += piece.squares[axis];
+    }
+    Pilot pilot{static_cast<float>(stored / k_pilot_paths), {}};
+    if (stored == 0) return pilot;
+    double half[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        const double mean = sum[axis] / stored;
+        half[axis] = std::sqrt(3 * std::max(squares[axis] / stored - mean * mean, 0.0));
+        (&pilot.grid.low.x)[axis] = static_cast<float>(mean - half[axis]);
+    }
+    // Across a plane rounding alone would choose the cell.
+    const double least = std::max(1e-4 * *std::max_element(half, half + 3), 1e-30);
+    for (int axis = 0; axis < 3; ++axis) {
+        if (half[axis] > least) (&pilot.grid.cells_per_metre.x)[axis] = static_cast<float>(2 / half[axis]);
+    }
+    return pilot;
+}
+
+namespace {
+
+// Whether eye paths and splats can find all light that connections find: from lamps of no size none of what is seen in mirrors
+// can be met by chance.
+bool finds_all_unconnected(const SceneView& scene, const PassSettings& pass) {
+    if (!pass.roulette || !pass.hits || pass.light_samples == 0) return false;
+    if (pass.eye_path_length + pass.light_path_length + 1 > k_max_walk) return false;
+    return std::none_of(scene.lights, scene.lights + scene.light_count, [](const Light& l) { return is_delta(l); });
+}
+
+// As a trial finds it best: how many light paths splat, and no connections where they bring less than they take.
+PassSettings as_it_pays(const SceneView& scene, PassSettings pass, ThreadPool& pool) {
+    // What connections have to win: part of what the trial counts against a render without them would fall to splats.
+    constexpr double k_least_gain = 1.05;
+    constexpr uint32_t k_most_rounds = 8, k_most_paths = 1u << 31;
+    pass.light_rounds = 1;
+    const Trial trial = try_out(scene, pass, pool);
+    const uint32_t most = pass.splats ? std::min(k_most_rounds, k_most_paths / pass.light_paths) : 1;
+    const uint32_t asked = trial.as_asked.best_rounds(most), unconnected = trial.unconnected.best_rounds(most);
+    pass.light_rounds = asked;
+    if (pass.kappa == 0 || !finds_all_unconnected(scene, pass)) return pass;
+    if (trial.unconnected.toll(unconnected) < k_least_gain * trial.as_asked.toll(asked)) {
+        pass.kappa = 0;
+        pass.light_rounds = unconnected;
+        pass.eye_path_length += pass.light_path_length + 1;  // paths that were made of two become one
+    }
+    return pass;
+}
+
+}  // namespace
+
+PassSettings for_scene(const SceneView& scene, PassSettings pass, unsigned threads) {
+    const bool light_walks = pass.light_path_length > 0 && pass.light_paths > 0 && scene.light_count > 0;
+    pass.splats &= light_walks;
+    pass.kappa = 0;
+    ThreadPool pool(light_walks ? threads : 1);
+    if (pass.vlp_connections > 0 && light_walks) {
+        const Pilot pilot = trace_pilot(scene, pass, pool);
+        if (pilot.vlps_per_path > 0)
+            pass.kappa = static_cast<float>(pass.vlp_connections * pass.vlp_candidates) / pilot.vlps_per_path;
+        pass.vlp_grid = pilot.grid;
+    }
+    if (!pass.adaptive || !pass.traces_light() || pass.weighting != Weighting::balance) return pass;
+    return as_it_pays(scene, pass, pool);
+}
+
+}  // namespace vlp

@@ -1,0 +1,272 @@
+// A trial: light paths, VLPs and eye paths as an iteration has them, but few.
+//
+// The balance heuristic makes a path x count f(x) / p(x), whichever strategy found it, p being the sum of all densities and
+// counts. The square of it is f^2 / p on average. Without connections p is less by their share of it, and the square 1 / (1 -
+// share) times as large. So what a render without connections would be like follows from one with them, and precisely where
+// it matters: connections find the rare bright paths that such a render would seldom meet.
+#include "renderer/trial.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "integrator/light_tracing.h"
+#include "integrator/path_tracing.h"
+#include "integrator/vlp_groups.h"
+
+namespace vlp {
+namespace {
+
+constexpr uint32_t k_rounds = 8;  // each with one path through every pixel that is looked at
+constexpr uint32_t k_light_paths = 512;  // in each round, at most
+constexpr int k_around = 2;  // pixels to each side whose noise is taken together
+constexpr double k_most_times = 30;  // as large as the pixel's mean a find counts at most: more of it is chance
+constexpr float k_most_growth = 1000;  // of a square without connections: a render will not meet what comes more seldom
+
+// In steps of an eye walk. Of several candidates hardly any is kept that no shadow ray is sent to. A light vertex has a ray to
+// the lens, and is listed.
+double connection_cost(const PassSettings& pass) {
+    return pass.vlp_connections * (pass.vlp_candidates == 1 ? 0.65 : 1.2 + 0.006 * pass.vlp_candidates);
+}
+constexpr double k_light_vertex_cost = 2;
+
+// The pixels that are looked at, evenly spread over the whole picture: one in the middle of each cell.
+struct Cells {
+    uint32_t width, height;  // of the picture
+    uint32_t columns, rows;
+
+    explicit Cells(const Camera& camera)
+        : width(camera.width), height(camera.height), columns(along(width)), rows(along(height)) {}
+
+    size_t count() const { return size_t{columns} * rows; }
+    double pixels_each() const { return static_cast<double>(width) * height / static_cast<double>(count()); }
+    uint32_t x_of(size_t cell) const { return middle(static_cast<uint32_t>(cell % columns), columns, width); }
+    uint32_t y_of(size_t cell) const { return middle(static_cast<uint32_t>(cell / columns), rows, height); }
+    size_t at(Vec2 film) const { return size_t{index(film.y, rows, height)} * columns + index(film.x, columns, width); }
+
+    // The mean over the cells around one.
+    double around(size_t cell, const std::vector<double>& values) const {
+        const auto x = static_cast<int>(cell % columns), y = static_cast<int>(cell / columns);
+        double sum = 0;
+        int cells = 0;
+        for (int j = std::max(y - k_around, 0); j <= std::min(y + k_around, static_cast<int>(rows) - 1); ++j) {
+            for (int i = std::max(x - k_around, 0); i <= std::min(x + k_around, static_cast<int>(columns) - 1); ++i) {
+                sum += values[static_cast<size_t>(j) * columns + static_cast<size_t>(i)];
+                ++cells;
+            }
+        }
+        return sum / cells;
+    }
+
+private:
+    static uint32_t along(uint32_t pixels) { return std::min(std::clamp(pixels / 8, 8u, 32u), pixels); }
+    static uint32_t middle(uint32_t i, uint32_t cells, uint32_t pixels) {
+        return static_cast<uint32_t>((uint64_t{2} * i + 1) * pixels / (2 * cells));
+    }
+    static uint32_t index(float at, uint32_t cells, uint32_t pixels) {
+        return std::min(static_cast<uint32_t>(at * static_cast<float>(cells) / static_cast<float>(pixels)), cells - 1);
+    }
+};
+
+// Something that was found: what it adds to a pixel, and by what share its square would grow without connections.
+struct Find {
+    float light = 0, growth = 0;
+
+    Find(const PassSettings& pass, const Contribution& c, float scale) {
+        const Rgb found = c.value * (c.weight * scale);
+        if (!is_finite(found)) return;
+        light = average(clamped(pass, c.s + c.t, found));
+        const float left = (1 - c.connection_share) * c.draws;
+        growth = (left > 1 / k_most_growth ? 1 / left : k_most_growth) - 1;
+    }
+};
+
+// An eye path through a pixel.
+struct TriedPath {
+    using Sum = ConnectionSum;
+
+    const SceneView& scene;
+    const PassSettings& pass;
+    float scale;  // light paths of an iteration for each of the trial
+    float light = 0;
+    double growth = 0;  // of the square
+    uint32_t steps = 1, joined = 0;  // joined: surfaces that connections begin at
+
+    void visit(const EyeWalk& eye) {
+        ++steps;
+        if (scene.materials[eye.surface.material].has_finite) ++joined;
+    }
+    void add(const Contribution& c) {
+        const Find find(pass, c, c.s >= 2 ? scale : 1.0f);
+        light += find.light;
+        growth += static_cast<double>(find.growth) * find.light * find.light;
+    }
+};
+
+// Splats that fall on the picture, for h = 1.
+struct TriedSplats {
+    using Sum = ConnectionSum;
+
+    struct Fallen {
+        size_t cell;
+        Find find;
+    };
+    const PassSettings& pass;
+    const Cells& cells;
+    std::vector<Fallen> fallen{};
+
+    bool wanted(uint32_t i) const { return splats_from(pass, i); }
+    bool reaches(Vec2 film) const {
+        return film.x >= 0 && film.y >= 0 && film.x < static_cast<float>(cells.width) &&
+               film.y < static_cast<float>(cells.height);
+    }
+    void add(const Splat& splat) { fallen.push_back({cells.at(splat.film), Find(pass, splat.found, 1)}); }
+};
+
+struct Round {
+    std::vector<TriedPath> paths;  // one of each cell
+    std::vector<TriedSplats::Fallen> splats;
+    uint32_t light_vertices = 0;
+};
+
+uint32_t light_paths_of_round(const PassSettings& pass) { return std::min(pass.light_paths, k_light_paths); }
+float light_scale(const PassSettings& pass) {
+    return static_cast<float>(pass.light_paths) / static_cast<float>(std::max(light_paths_of_round(pass), 1u));
+}
+
+Round run_round(const SceneView& scene, PassSettings pass, const Cells& cells, uint32_t number) {
+    pass.seed = hash(k_pilot_stream, 2 + number);
+    Round round;
+    std::vector<LightVertex> slots(size_t{light_paths_of_round(pass)} * pass.light_path_length);
+    TriedSplats splats{pass, cells};
+    for (uint32_t path = 0; path < light_paths_of_round(pass); ++path) {
+        round.light_vertices +=
+            trace_light_path(scene, pass, k_light_stream, 0, path, slots.data() + round.light_vertices, splats);
+    }
+    round.splats = std::move(splats.fallen);
+
+    std::vector<uint32_t> groups(k_vlp_groups + 1);
+    count_groups(pass.vlp_grid, slots.data(), 0, round.light_vertices, groups.data(), 1);
+    std::exclusive_scan(groups.begin(), groups.end(), groups.begin(), 0u);
+    const Hands hands(pass.vlp_candidates, groups.back());
+    std::vector<VlpCandidate> stored(hands.places());
+    list_groups(scene, pass, slots.data(), 0, round.light_vertices, groups.data(), 1, hands, stored.data());
+    list_blanks(hands, groups.back(), stored.data());
+    const LightVertexCache cache{slots.data(), stored.data(), hands.count};
+
+    round.paths.reserve(cells.count());
+    for (size_t i = 0; i < cells.count(); ++i) {
+        TriedPath& path = round.paths.emplace_back(scene, pass, light_scale(pass));
+        trace_eye_path(scene, pass, cache, {}, cells.x_of(i), cells.y_of(i), path);
+    }
+    return round;
+}
+
+// The integral of h^2, by which splats are noisier than if each fell on one pixel.
+double squared_filter(const PassSettings& pass) {
+    constexpr int k_steps = 64;
+    const float radius = filter_radius(pass.filter, pass.filter_width), step = 2 * radius / k_steps;
+    double sum = 0;
+    for (int i = 0; i < k_steps; ++i) {
+        const auto h = static_cast<double>(
+            eval_1d(pass.filter, pass.filter_width, (static_cast<float>(i) + 0.5f) * step - radius));
+        sum += h * h * static_cast<double>(step);
+    }
+    return sum * sum;
+}
+
+// What all rounds together tell of either way to render.
+class Reckoning {
+public:
+    Reckoning(const PassSettings& pass, const Cells& cells, const std::vector<Round>& rounds)
+        : pass_(pass), cells_(cells), rounds_(rounds), level_(cells.count()) {
+        std::vector<double> mean(cells.count());
+        for (const Round& round : rounds) {
+            for (size_t i = 0; i < mean.size(); ++i) mean[i] += static_cast<double>(round.paths[i].light) / k_rounds;
+            for (const auto& splat : round.splats) {
+                mean[splat.cell] += static_cast<double>(splat.find.light) * splats_in_pixel() / k_rounds;
+            }
+        }
+        for (size_t i = 0; i < level_.size(); ++i) level_[i] = 0.1 + std::max(mean[i], cells.around(i, mean));
+    }
+
+    Prospect prospect(bool connected) const {
+        const auto count = static_cast<double>(cells_.count());
+        Prospect sum;
+        std::vector<double> variance(cells_.count());
+        double weights = 0;
+        for (size_t i = 0; i < cells_.count(); ++i) {
+            // Adaptive sampling gives a pixel samples by its deviation, so they cost what they do where there is noise.
+            variance[i] = relative_variance(i, connected);
+            const double weight = std::sqrt(variance[i]);
+            weights += weight, sum.eye_cost += weight * cost(i, connected);
+        }
+        sum.eye_cost = weights > 0 ? sum.eye_cost / weights : 1;
+        // And what counts is the mean of deviations. Eight rounds say little of one pixel's.
+        for (size_t i = 0; i < cells_.count(); ++i) sum.eye_variance += std::sqrt(cells_.around(i, variance)) / count;
+        sum.eye_variance *= sum.eye_variance;
+        double vertices = 0;
+        for (const Round& round : rounds_) {
+            vertices += round.light_vertices / static_cast<double>(k_rounds);
+            for (const auto& splat : round.splats) {
+                const double light = std::min(static_cast<double>(splat.find.light) / level_[splat.cell], k_most_times);
+                const double growth = connected ? 1.0 : 1.0 + static_cast<double>(splat.find.growth);
+                sum.splat_variance += light * light * growth * splats_in_pixel() / (count * k_rounds);
+            }
+        }
+        sum.splat_variance *= squared_filter(pass_);
+        sum.light_cost = (light_paths_of_round(pass_) + vertices * k_light_vertex_cost) * splats_in_pixel() / count;
+        return sum;
+    }
+
+private:
+    // Those that fall on a pixel in an iteration, for each that fell on its cell in a round.
+    double splats_in_pixel() const { return static_cast<double>(light_scale(pass_)) / cells_.pixels_each(); }
+
+    double cost(size_t cell, bool connected) const {
+        double sum = 0;
+        for (const Round& round : rounds_) {
+            const TriedPath& path = round.paths[cell];
+            sum += path.steps + (connected ? path.joined * connection_cost(pass_) : 0.0);
+        }
+        return sum / k_rounds;
+    }
+    double relative_variance(size_t cell, bool connected) const {
+        double sum = 0, squares = 0, growth = 0;
+        for (const Round& round : rounds_) {
+            const TriedPath& path = round.paths[cell];
+            const double found = static_cast<double>(path.light), light = std::min(found, k_most_times * level_[cell]);
+            sum += light, squares += light * light;
+            growth += path.growth * (light < found ? (light / found) * (light / found) : 1.0);
+        }
+        double variance = (squares - sum * sum / k_rounds) / (k_rounds - 1);
+        if (!connected) variance += growth / k_rounds;
+        return std::max(variance, 0.0) / (level_[cell] * level_[cell]);
+    }
+
+    const PassSettings& pass_;
+    const Cells& cells_;
+    const std::vector<Round>& rounds_;
+    std::vector<double> level_;  // mean + 0.1
+};
+
+}  // namespace
+
+uint32_t Prospect::best_rounds(uint32_t most) const {
+    uint32_t best = 1;
+    for (uint32_t rounds = 2; rounds <= most; ++rounds) {
+        if (toll(rounds) < toll(best)) best = rounds;
+    }
+    return best;
+}
+
+Trial try_out(const SceneView& scene, const PassSettings& pass, ThreadPool& pool) {
+    const Cells cells(scene.camera);
+    std::vector<Round> rounds(k_rounds);
+    pool.run(k_rounds, [&](uint32_t i) { rounds[i] = run_round(scene, pass, cells, i); });
+    const Reckoning reckoning(pass, cells, rounds);
+    return {reckoning.prospect(true), reckoning.prospect(false)};
+}
+
+}  // namespace vlp

@@ -1,0 +1,227 @@
+// What settings are worth in a scene: predictions beside what comes of them, and what is chosen.
+#include "renderer/trial.h"
+
+#include "gpu_cases.h"
+#include "renderer/pilot.h"
+
+namespace vlp::test {
+namespace {
+
+constexpr uint32_t k_size = 128;
+
+std::unique_ptr<Scene> seen(const std::function<void(Scene&)>& fill, const Camera& camera, uint32_t size = k_size) {
+    auto scene = std::make_unique<Scene>();
+    add_materials(*scene);
+    fill(*scene);
+    scene->set_camera(camera);
+    scene->set_film(size, size, {0, 0, size, size}, false);
+    scene->build(1);
+    return scene;
+}
+
+void add_floor(Scene& scene, float half = 2) {
+    add_surface(scene, quad({-half, -half, 0}, {half, -half, 0}, {half, half, 0}, {-half, half, 0}), k_white);
+}
+
+Light lamp(Vec3 position, float size) {
+    return make_area(placed_at(position, {size, size, 1}), {20, 20, 20}, 1, 1, false, k_pi).value();
+}
+
+// A ball on a floor under a sky: hardly any light that has met a surface meets another.
+std::unique_ptr<Scene> outdoors(uint32_t size = k_size) {
+    return seen(
+        [](Scene& scene) {
+            add_floor(scene);
+            add_sphere(scene, {0, 0, 0.5f}, 0.5f, k_red);
+            scene.set_world({1, 0.9f, 0.8f});
+        },
+        looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f), size);
+}
+
+// A lamp that shines at a wall only, and is seen from nowhere else.
+std::unique_ptr<Scene> indirect() {
+    return seen(
+        [](Scene& scene) {
+            add_floor(scene);
+            add_surface(scene, quad({-2, 2, 0}, {2, 2, 0}, {2, 2, 3}, {-2, 2, 3}), k_white);
+            add_surface(scene, quad({-2, -2, 0}, {-2, 2, 0}, {-2, 2, 3}, {-2, -2, 3}), k_white);
+            add_surface(scene, quad({-2, -2, 3}, {2, -2, 3}, {2, 2, 3}, {-2, 2, 3}), k_white);
+            add_surface(scene, quad({-0.5f, -0.5f, 2.4f}, {0.5f, -0.5f, 2.4f}, {0.5f, 0.5f, 2.4f}, {-0.5f, 0.5f, 2.4f}),
+                        k_white);
+            Affine up = placed_at({0, 0, 2.5f}, {0.5f, 0.5f, -1});
+            scene.add_lamp(make_area(up, {20, 20, 20}, 1, 1, false, k_pi).value(), 0);
+        },
+        looking({0, -5, 1.5f}, {0, 0, 1}, 0.4f));
+}
+
+// A small lamp over a glass ball.
+std::unique_ptr<Scene> caustic() {
+    return seen(
+        [](Scene& scene) {
+            add_floor(scene);
+            std::vector<LobeInput> lobes{lobe(LobeKind::dielectric, 1)};
+            add_sphere(scene, {0, 0, 0.7f}, 0.5f, static_cast<int32_t>(scene.add_material(lobes, {})));
+            scene.add_lamp(lamp({0.6f, 0, 4}, 0.1f), 0);
+        },
+        looking({0, -4, 3}, {0, 0, 0.3f}, 0.5f));
+}
+
+PassSettings adaptive() {
+    PassSettings pass = balanced(k_size * k_size / 8);
+    pass.vlp_candidates = 8;
+    pass.adaptive = true;
+    return pass;
+}
+
+PassSettings uniform() {
+    PassSettings pass = adaptive();
+    pass.adaptive = false;
+    return pass;
+}
+
+Trial tried(const Scene& scene, PassSettings pass, unsigned threads = 1) {
+    ThreadPool pool(threads);
+    return try_out(scene.view(), for_scene(scene.view(), pass), pool);
+}
+
+TEST(Trial, SaysTheSameOnAnyThreads) {
+    const auto scene = caustic();
+    const Trial one = tried(*scene, uniform(), 1), three = tried(*scene, uniform(), 3);
+    for (const auto& [a, b] : {std::pair{one.as_asked, three.as_asked}, {one.unconnected, three.unconnected}}) {
+        EXPECT_EQ(a.eye_variance, b.eye_variance);
+        EXPECT_EQ(a.splat_variance, b.splat_variance);
+        EXPECT_EQ(a.eye_cost, b.eye_cost);
+        EXPECT_EQ(a.light_cost, b.light_cost);
+    }
+}
+
+// From paths with connections: what a trial of settings without them finds by itself.
+TEST(Trial, PredictsARenderWithoutConnections) {
+    for (const auto& scene : {outdoors(), indirect()}) {
+        PassSettings without = uniform();
+        without.vlp_connections = 0;
+        const Prospect predicted = tried(*scene, uniform()).unconnected, found = tried(*scene, without).as_asked;
+        const double variance = predicted.eye_variance + predicted.splat_variance;
+        const double expected = found.eye_variance + found.splat_variance;
+        EXPECT_GT(variance, 0.5 * expected);
+        EXPECT_LT(variance, 2.5 * expected) << "splats would share what it takes for the eye's";
+        EXPECT_NEAR(predicted.eye_cost, found.eye_cost, 0.2 * found.eye_cost);
+        EXPECT_NEAR(predicted.light_cost, found.light_cost, 1e-6);
+    }
+    const Trial trial = tried(*indirect(), uniform());
+    EXPECT_GT(trial.unconnected.eye_variance, 2 * trial.as_asked.eye_variance);
+    EXPECT_LT(trial.unconnected.eye_cost, 0.8 * trial.as_asked.eye_cost);
+}
+
+// The variance of an iteration, by many.
+TEST(Trial, TellsTheVarianceOfSamples) {
+    const auto scene = indirect();
+    const PassSettings pass = for_scene(scene->view(), uniform());
+    const auto cpu = make_cpu_backend(*scene, pass, 1);
+    std::vector<PixelMoments> moments(k_size * k_size);
+    for (uint32_t i = 0; i < 16; ++i) {
+        Film film(scene->window(), pass.splats, pass.guides);
+        ASSERT_TRUE(cpu->run_iteration(i, film, false));
+        std::vector<float> rgba(moments.size() * 4);
+        film.read(rgba);
+        for (size_t p = 0; p < moments.size(); ++p) {
+            moments[p].add({{rgba[4 * p], rgba[4 * p + 1], rgba[4 * p + 2], 1}}, 1);
+        }
+    }
+    double deviation = 0;
+    for (const PixelMoments& m : moments) deviation += std::sqrt(static_cast<double>(m.relative_variance()));
+    deviation /= static_cast<double>(moments.size());
+    const Prospect told = tried(*scene, uniform()).as_asked;
+    EXPECT_NEAR(std::sqrt(told.eye_variance + told.splat_variance), deviation, 0.3 * deviation);
+}
+
+TEST(Trial, TheBestRoundsCostLeast) {
+    for (const double splats : {0.0, 0.01, 0.3, 5.0}) {
+        const Prospect prospect{1, splats, 6, 0.5};
+        const uint32_t best = prospect.best_rounds(8);
+        for (uint32_t rounds = 1; rounds <= 8; ++rounds) EXPECT_LE(prospect.toll(best), prospect.toll(rounds));
+    }
+    EXPECT_EQ((Prospect{1, 0, 6, 0.5}.best_rounds(8)), 1u);
+    EXPECT_EQ((Prospect{1, 5, 6, 0.5}.best_rounds(8)), 8u);
+    EXPECT_EQ((Prospect{1, 5, 6, 0.5}.best_rounds(3)), 3u);
+}
+
+TEST(ForScene, ChoosesWhatPays) {
+    const PassSettings open = for_scene(outdoors()->view(), adaptive());
+    EXPECT_EQ(open.kappa, 0);
+    EXPECT_EQ(open.eye_path_length, 16u + 12 + 1) << "paths of as many vertices as connections could make";
+    const PassSettings room = for_scene(indirect()->view(), adaptive());
+    EXPECT_GT(room.kappa, 0);
+    EXPECT_EQ(room.light_rounds, 1u);
+    EXPECT_EQ(room.eye_path_length, 16u);
+    EXPECT_GT(for_scene(caustic()->view(), adaptive()).light_rounds, 2u);
+    const PassSettings as_asked = for_scene(outdoors()->view(), uniform());
+    EXPECT_GT(as_asked.kappa, 0);
+    EXPECT_EQ(as_asked.light_rounds, 1u);
+}
+
+// Without connections some of its light would be lost, however small the share.
+TEST(ForScene, KeepsConnectionsThatNothingReplaces) {
+    const auto open = outdoors();
+    PassSettings pass = adaptive();
+    pass.light_samples = 0;
+    EXPECT_GT(for_scene(open->view(), pass).kappa, 0);
+    pass = adaptive();
+    pass.hits = false;
+    EXPECT_GT(for_scene(open->view(), pass).kappa, 0);
+    pass = adaptive();
+    pass.roulette = false;
+    EXPECT_GT(for_scene(open->view(), pass).kappa, 0);
+    pass = adaptive();
+    pass.light_path_length = 40, pass.eye_path_length = 30;
+    EXPECT_GT(for_scene(open->view(), pass).kappa, 0);
+    pass = adaptive();
+    pass.weighting = Weighting::power;
+    EXPECT_GT(for_scene(open->view(), pass).kappa, 0);
+    const auto sharp = seen(
+        [](Scene& scene) {
+            add_floor(scene);
+            scene.add_lamp(make_sun(aslant({1, 1, 3}), {3, 3, 3}, 0).value(), 0);
+        },
+        looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f));
+    EXPECT_GT(for_scene(sharp->view(), adaptive()).kappa, 0);
+}
+
+TEST(ForScene, TakesPicturesOfAnySize) {
+    for (const uint32_t size : {1u, 2u, 7u, 33u}) {
+        const auto scene = outdoors(size);
+        PassSettings pass = adaptive();
+        pass.light_paths = 1;
+        EXPECT_GE(for_scene(scene->view(), pass).light_rounds, 1u);
+    }
+    const auto dark = seen([](Scene& scene) { add_floor(scene); }, looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f));
+    EXPECT_EQ(for_scene(dark->view(), adaptive()).light_rounds, 1u);
+}
+
+// R rounds of N light paths splat as R N light paths do, and leave VLPs as N do.
+TEST(LightRounds, SplatAsSoManyPaths) {
+    const auto scene = room(16);
+    PassSettings pass = balanced(300);
+    pass.vlp_connections = 0;
+    const PassSettings many = for_scene(scene->view(), pass);
+    pass.light_paths = 100, pass.light_rounds = 3;
+    const PassSettings rounds = for_scene(scene->view(), pass);
+    EXPECT_EQ(rounds.splat_paths(), many.splat_paths());
+    expect_same_bits(cpu_sums(*scene, rounds, 3), cpu_sums(*scene, many, 3));
+    pass.vlp_connections = 1;
+    const PassSettings connected = for_scene(scene->view(), pass);
+    pass.light_rounds = 1;
+    const PassSettings once = for_scene(scene->view(), pass);
+    EXPECT_EQ(connected.kappa, once.kappa);
+    const auto vlps = [&](const PassSettings& with) {
+        const auto cpu = make_cpu_backend(*scene, with, 2);
+        Film film(scene->window(), with.splats, with.guides);
+        EXPECT_TRUE(cpu->run_iteration(0, film, false));
+        return cpu->counters.stored_vlps.load();
+    };
+    EXPECT_EQ(vlps(connected), vlps(once));
+    EXPECT_GT(vlps(once), 0u);
+}
+
+}  // namespace
+}  // namespace vlp::test
