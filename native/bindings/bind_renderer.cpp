@@ -10,6 +10,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "renderer/pilot.h"
 #include "renderer/renderer.h"
 #include "renderer/strategies.h"
 #include "renderer/truncation.h"

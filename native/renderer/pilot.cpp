@@ -86,7 +86,7 @@ PassSettings as_it_pays(const SceneView& scene, PassSettings pass, ThreadPool& p
     const uint32_t asked = trial.as_asked.best_rounds(most), unconnected = trial.unconnected.best_rounds(most);
     pass.light_rounds = asked;
     if (pass.kappa == 0 || !finds_all_unconnected(scene, pass)) return pass;
-    if (trial.unconnected.toll(unconnected) < k_least_gain * trial.as_asked.toll(asked)) {
+    if (trial.unconnected.inverse_efficiency(unconnected) < k_least_gain * trial.as_asked.inverse_efficiency(asked)) {
         pass.kappa = 0;
         pass.light_rounds = unconnected;
         pass.eye_path_length += pass.light_path_length + 1;  // paths that were made of two become one

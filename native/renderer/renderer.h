@@ -14,7 +14,6 @@
 #include "backend/backend.h"
 #include "renderer/helper.h"
 #include "renderer/iterations.h"
-#include "renderer/pilot.h"
 
 namespace vlp {
 

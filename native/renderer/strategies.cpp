@@ -1,14 +1,13 @@
 // What each strategy finds, image by image.
 #include "renderer/strategies.h"
 
-#include <numeric>
 #include <stdexcept>
 
 #include "backend/memory.h"
 #include "integrator/light_tracing.h"
 #include "integrator/path_tracing.h"
-#include "integrator/vlp_groups.h"
-#include "renderer/renderer.h"
+#include "renderer/pilot.h"
+#include "renderer/vlp_list.h"
 #include "scene/scene.h"
 
 namespace vlp {
@@ -37,11 +36,15 @@ struct StrategyRenderer::LightSink {
     }
 };
 
+namespace {
+
 // Each of them as often in every pixel, whether it pays or not.
 PassSettings for_all_strategies(const SceneView& scene, PassSettings pass) {
     pass.adaptive = false;
     return for_scene(scene, pass);
 }
+
+}  // namespace
 
 StrategyRenderer::StrategyRenderer(std::shared_ptr<const Scene> scene, const PassSettings& pass, unsigned threads)
     : scene_(std::move(scene)),
@@ -49,7 +52,6 @@ StrategyRenderer::StrategyRenderer(std::shared_ptr<const Scene> scene, const Pas
       window_(scene_->window()),
       pool_(threads) {
     if (pass_.traces_light()) slots_.resize(light_vertex_capacity(pass_));
-    stored_.resize(candidate_capacity(pass_));
     sums_.resize(image(most_light_vertices() + 1, 0, false));
 }
 
@@ -60,13 +62,7 @@ void StrategyRenderer::iterate(uint32_t iteration) {
     for (uint32_t path = 0; path < pass_.light_paths && pass_.traces_light(); ++path) {
         end += trace_light_path(scene, pass_, k_light_stream, iteration, path, &slots_[end], splats);
     }
-    std::vector<uint32_t> groups(k_vlp_groups + 1);
-    count_groups(pass_.vlp_grid, slots_.data(), 0, end, groups.data(), 1);
-    std::exclusive_scan(groups.begin(), groups.end(), groups.begin(), 0u);
-    const Hands hands(pass_.vlp_candidates, groups.back());
-    list_groups(scene, pass_, slots_.data(), 0, end, groups.data(), 1, hands, stored_.data());
-    list_blanks(hands, groups.back(), stored_.data());
-    const LightVertexCache cache{slots_.data(), stored_.data(), hands.count};
+    const LightVertexCache cache = list_vlps(scene, pass_, slots_.data(), end, stored_);
     pool_.run(window_.height, [&](uint32_t y) {
         for (uint32_t x = 0; x < window_.width; ++x) {
             EyeSink found{*this, static_cast<size_t>(y) * window_.width + x};

@@ -8,12 +8,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "integrator/light_tracing.h"
 #include "integrator/path_tracing.h"
-#include "integrator/vlp_groups.h"
+#include "renderer/vlp_list.h"
 
 namespace vlp {
 namespace {
@@ -146,14 +145,8 @@ Round run_round(const SceneView& scene, PassSettings pass, const Cells& cells, u
     }
     round.splats = std::move(splats.fallen);
 
-    std::vector<uint32_t> groups(k_vlp_groups + 1);
-    count_groups(pass.vlp_grid, slots.data(), 0, round.light_vertices, groups.data(), 1);
-    std::exclusive_scan(groups.begin(), groups.end(), groups.begin(), 0u);
-    const Hands hands(pass.vlp_candidates, groups.back());
-    std::vector<VlpCandidate> stored(hands.places());
-    list_groups(scene, pass, slots.data(), 0, round.light_vertices, groups.data(), 1, hands, stored.data());
-    list_blanks(hands, groups.back(), stored.data());
-    const LightVertexCache cache{slots.data(), stored.data(), hands.count};
+    std::vector<VlpCandidate> stored;
+    const LightVertexCache cache = list_vlps(scene, pass, slots.data(), round.light_vertices, stored);
 
     round.paths.reserve(cells.count());
     for (size_t i = 0; i < cells.count(); ++i) {
@@ -256,7 +249,7 @@ private:
 uint32_t Prospect::best_rounds(uint32_t most) const {
     uint32_t best = 1;
     for (uint32_t rounds = 2; rounds <= most; ++rounds) {
-        if (toll(rounds) < toll(best)) best = rounds;
+        if (inverse_efficiency(rounds) < inverse_efficiency(best)) best = rounds;
     }
     return best;
 }

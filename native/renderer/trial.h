@@ -12,8 +12,8 @@ struct Prospect {
     double eye_variance = 0, splat_variance = 0;
     double eye_cost = 0, light_cost = 0;  // for each pixel
 
-    // Variance times cost with `rounds` times the light paths, R: what is to be least.
-    double toll(double rounds) const {
+    // Variance times cost (the inverse of efficiency, Veach 1997, chapter 2) with R = `rounds`: what is to be least.
+    double inverse_efficiency(double rounds) const {
         return (eye_variance + splat_variance / rounds) * (eye_cost + light_cost * rounds);
     }
     // The R for which it is, of `most` or fewer.

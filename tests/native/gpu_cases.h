@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host_device.h"
+#include "renderer/pilot.h"
 #include "renderer/renderer.h"
 #include "same_sums.h"
 #include "transport_scenes.h"

@@ -8,7 +8,7 @@
 #include "integrator/path_tracing.h"
 #include "integrator/vlp_groups.h"
 #include "integrator/weights_reference.h"
-#include "renderer/renderer.h"
+#include "renderer/pilot.h"
 
 namespace vlp::test {
 

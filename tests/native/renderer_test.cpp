@@ -1,6 +1,7 @@
 // Renderers of one device and of two: every iteration is in the picture once, whoever made it and whoever failed.
 #include "renderer/renderer.h"
 
+#include "renderer/pilot.h"
 #include "same_sums.h"
 #include "scene/scene.h"
 #include "transport_scenes.h"

@@ -2,7 +2,6 @@
 #include "renderer/trial.h"
 
 #include "gpu_cases.h"
-#include "renderer/pilot.h"
 
 namespace vlp::test {
 namespace {
@@ -19,12 +18,10 @@ std::unique_ptr<Scene> seen(const std::function<void(Scene&)>& fill, const Camer
     return scene;
 }
 
-void add_floor(Scene& scene, float half = 2) {
-    add_surface(scene, quad({-half, -half, 0}, {half, -half, 0}, {half, half, 0}, {-half, half, 0}), k_white);
-}
+void add_floor(Scene& scene) { add_surface(scene, quad({-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}), k_white); }
 
-Light lamp(Vec3 position, float size) {
-    return make_area(placed_at(position, {size, size, 1}), {20, 20, 20}, 1, 1, false, k_pi).value();
+void add_area_lamp(Scene& scene, const Affine& placement) {
+    scene.add_lamp(make_area(placement, {20, 20, 20}, 1, 1, false, k_pi).value(), 0);
 }
 
 // A ball on a floor under a sky: hardly any light that has met a surface meets another.
@@ -38,7 +35,7 @@ std::unique_ptr<Scene> outdoors(uint32_t size = k_size) {
         looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f), size);
 }
 
-// A lamp that shines at a wall only, and is seen from nowhere else.
+// A lamp that shines at the ceiling alone, hidden from below.
 std::unique_ptr<Scene> indirect() {
     return seen(
         [](Scene& scene) {
@@ -48,8 +45,7 @@ std::unique_ptr<Scene> indirect() {
             add_surface(scene, quad({-2, -2, 3}, {2, -2, 3}, {2, 2, 3}, {-2, 2, 3}), k_white);
             add_surface(scene, quad({-0.5f, -0.5f, 2.4f}, {0.5f, -0.5f, 2.4f}, {0.5f, 0.5f, 2.4f}, {-0.5f, 0.5f, 2.4f}),
                         k_white);
-            Affine up = placed_at({0, 0, 2.5f}, {0.5f, 0.5f, -1});
-            scene.add_lamp(make_area(up, {20, 20, 20}, 1, 1, false, k_pi).value(), 0);
+            add_area_lamp(scene, placed_at({0, 0, 2.5f}, {0.5f, 0.5f, -1}));
         },
         looking({0, -5, 1.5f}, {0, 0, 1}, 0.4f));
 }
@@ -61,7 +57,7 @@ std::unique_ptr<Scene> caustic() {
             add_floor(scene);
             std::vector<LobeInput> lobes{lobe(LobeKind::dielectric, 1)};
             add_sphere(scene, {0, 0, 0.7f}, 0.5f, static_cast<int32_t>(scene.add_material(lobes, {})));
-            scene.add_lamp(lamp({0.6f, 0, 4}, 0.1f), 0);
+            add_area_lamp(scene, placed_at({0.6f, 0, 4}, {0.1f, 0.1f, 1}));
         },
         looking({0, -4, 3}, {0, 0, 0.3f}, 0.5f));
 }
@@ -139,7 +135,8 @@ TEST(Trial, TheBestRoundsCostLeast) {
     for (const double splats : {0.0, 0.01, 0.3, 5.0}) {
         const Prospect prospect{1, splats, 6, 0.5};
         const uint32_t best = prospect.best_rounds(8);
-        for (uint32_t rounds = 1; rounds <= 8; ++rounds) EXPECT_LE(prospect.toll(best), prospect.toll(rounds));
+        for (uint32_t rounds = 1; rounds <= 8; ++rounds)
+            EXPECT_LE(prospect.inverse_efficiency(best), prospect.inverse_efficiency(rounds));
     }
     EXPECT_EQ((Prospect{1, 0, 6, 0.5}.best_rounds(8)), 1u);
     EXPECT_EQ((Prospect{1, 5, 6, 0.5}.best_rounds(8)), 8u);

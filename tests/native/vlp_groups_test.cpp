@@ -2,7 +2,7 @@
 #include "integrator/vlp_groups.h"
 
 #include "random_numbers.h"
-#include "renderer/renderer.h"
+#include "renderer/pilot.h"
 #include "transport_scenes.h"
 
 #include <gtest/gtest.h>

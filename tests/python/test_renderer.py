@@ -123,6 +123,8 @@ def test_the_light_paths_that_there_was_room_for_are_told(fake: Any) -> None:
     assert renderer.metadata()["settings"]["light_paths"] == 100
     renderer._native.light_paths = 25
     assert renderer.metadata()["settings"]["light_paths"] == 25
+    renderer._native.light_paths, renderer._native.light_rounds = 4 * 25, 4
+    assert renderer.metadata()["settings"]["light_paths"] == 25, "those of one round"
     renderer._native.light_paths = 0  # none are needed
     assert renderer.metadata()["settings"]["light_paths"] == 100
 
