@@ -109,26 +109,48 @@ TEST(Trial, PredictsARenderWithoutConnections) {
     EXPECT_LT(trial.unconnected.eye_cost, 0.8 * trial.as_asked.eye_cost);
 }
 
-// The variance of an iteration, by many.
-TEST(Trial, TellsTheVarianceOfSamples) {
-    const auto scene = indirect();
-    const PassSettings pass = for_scene(scene->view(), uniform());
-    const auto cpu = make_cpu_backend(*scene, pass, 1);
+// The moments of the pixels over 16 iterations.
+std::vector<PixelMoments> measured(const Scene& scene, const PassSettings& pass) {
+    const auto cpu = make_cpu_backend(scene, pass, 1);
     std::vector<PixelMoments> moments(k_size * k_size);
     for (uint32_t i = 0; i < 16; ++i) {
-        Film film(scene->window(), pass.splats, pass.guides);
-        ASSERT_TRUE(cpu->run_iteration(i, film, false));
+        Film film(scene.window(), pass.splats, pass.guides);
+        EXPECT_TRUE(cpu->run_iteration(i, film, false));
         std::vector<float> rgba(moments.size() * 4);
         film.read(rgba);
         for (size_t p = 0; p < moments.size(); ++p) {
             moments[p].add({{rgba[4 * p], rgba[4 * p + 1], rgba[4 * p + 2], 1}}, 1);
         }
     }
+    return moments;
+}
+
+TEST(Trial, TellsTheVarianceOfSamples) {
+    const auto scene = indirect();
     double deviation = 0;
-    for (const PixelMoments& m : moments) deviation += std::sqrt(static_cast<double>(m.relative_variance()));
-    deviation /= static_cast<double>(moments.size());
+    for (const PixelMoments& m : measured(*scene, for_scene(scene->view(), uniform()))) {
+        deviation += std::sqrt(static_cast<double>(m.relative_variance())) / (k_size * k_size);
+    }
     const Prospect told = tried(*scene, uniform()).as_asked;
     EXPECT_NEAR(std::sqrt(told.eye_variance + told.splat_variance), deviation, 0.3 * deviation);
+}
+
+// Nothing else finds light here.
+TEST(Trial, TellsTheVarianceOfSplats) {
+    const auto scene = seen([](Scene& s) { add_floor(s), add_area_lamp(s, placed_at({0, 0, 3})); },
+                            looking({0, -3, 3}, {0, 0, 0}, 0.2f));
+    PassSettings pass = uniform();
+    pass.vlp_connections = pass.light_samples = 0, pass.hits = false;
+    for (const float width : {1.0f, 1.5f, 3.0f}) {
+        pass.filter_width = width;
+        double variance = 0;
+        for (const PixelMoments& m : measured(*scene, for_scene(scene->view(), pass))) {
+            variance += static_cast<double>(m.relative_variance()) / (k_size * k_size);
+        }
+        const Prospect told = tried(*scene, pass).as_asked;
+        EXPECT_NEAR(told.splat_variance, variance, 0.2 * variance) << width;
+        EXPECT_EQ(told.eye_variance, 0);
+    }
 }
 
 TEST(Trial, TheBestRoundsCostLeast) {
