@@ -20,7 +20,7 @@ namespace {
 constexpr uint32_t k_rounds = 8;  // each with one path through every pixel that is looked at
 constexpr uint32_t k_light_paths = 512;  // in each round, at most
 constexpr int k_around = 2;  // pixels to each side whose noise is taken together
-constexpr double k_most_times = 30;  // as large as the pixel's mean a find counts at most: more of it is chance
+constexpr double k_most_times = 30;  // as large as usual that a find counts at most: more of it is chance
 constexpr float k_most_growth = 1000;  // of a square without connections: a render will not meet what comes more seldom
 
 // In steps of an eye walk. Of several candidates hardly any is kept that no shadow ray is sent to. A light vertex has a ray to
@@ -199,11 +199,17 @@ public:
         // And what counts is the mean of deviations. Eight rounds say little of one pixel's.
         for (size_t i = 0; i < cells_.count(); ++i) sum.eye_variance += std::sqrt(cells_.around(i, variance)) / count;
         sum.eye_variance *= sum.eye_variance;
-        double vertices = 0;
+        double vertices = 0, splats = 0, relative_light = 0;
         for (const Round& round : rounds_) {
             vertices += round.light_vertices / static_cast<double>(k_rounds);
+            splats += static_cast<double>(round.splats.size());
+            for (const auto& splat : round.splats) relative_light += relative(splat);
+        }
+        // Where few splats fall each is bright, and not by chance.
+        const double most = k_most_times * std::max(1.0, splats > 0 ? relative_light / splats : 0.0);
+        for (const Round& round : rounds_) {
             for (const auto& splat : round.splats) {
-                const double light = std::min(static_cast<double>(splat.find.light) / level_[splat.cell], k_most_times);
+                const double light = std::min(relative(splat), most);
                 const double growth = connected ? 1.0 : 1.0 + static_cast<double>(splat.find.growth);
                 sum.splat_variance += light * light * growth * splats_in_pixel() / (count * k_rounds);
             }
@@ -214,6 +220,9 @@ public:
     }
 
 private:
+    double relative(const TriedSplats::Fallen& splat) const {
+        return static_cast<double>(splat.find.light) / level_[splat.cell];
+    }
     // Those that fall on a pixel in an iteration, for each that fell on its cell in a round.
     double splats_in_pixel() const { return static_cast<double>(light_scale(pass_)) / cells_.pixels_each(); }
 
