@@ -20,7 +20,7 @@ def lines(
         ("Total Time", duration(total_seconds)),
         ("Camera Paths", f"{statistics.eye_samples_per_second / 1e6:.2f} M/s"),
         ("Light Paths", f"{statistics.light_paths_per_second / 1e6:.2f} M/s"),
-        ("Virtual Lights", f"{statistics.vlps:,}" if statistics.connects else "Unused"),
+        ("Virtual Lights", f"{statistics.vlps:,}" if statistics.first_connections else "Unused"),
         ("Memory", memory(statistics.memory_bytes)),
     ]
     share, error = lost

@@ -127,8 +127,8 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
     adaptive: bpy.props.BoolProperty(
         name="Adaptive Sampling",
         description="Spend more samples where the picture is noisy and fewer where it is clean, more light paths where "
-        "there are caustics, and leave out virtual light points where they bring less than they take. The picture "
-        "stays right, and the number of samples is that of a pixel on average",
+        "there are caustics, more virtual light points in rooms lit indirectly, and none where they bring less than "
+        "they take. The picture stays right, and the number of samples is that of a pixel on average",
         default=_DEFAULTS["adaptive"],
     )
     light_path_length: bpy.props.IntProperty(
@@ -160,7 +160,7 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
     )
     vlp_connections: bpy.props.IntProperty(
         name="Virtual Lights per Hit",
-        description="How many virtual light points light each surface that the camera sees (C): less noise in "
+        description="How many virtual light points light each surface that a camera path meets (C): less noise in "
         "indirect light, for more time. Zero turns them off, as in an ordinary path tracer",
         default=_DEFAULTS["vlp_connections"],
         min=0,

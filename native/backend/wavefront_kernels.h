@@ -79,7 +79,7 @@ struct WavefrontSize {
 
     WavefrontSize(const PassSettings& pass, size_t pixel_count)
         : vertices_each(pass.eye_path_length + 1),
-          connections_each(pass.light_samples + (pass.kappa > 0 ? pass.vlp_connections : 0)),
+          connections_each(pass.light_samples + (pass.kappa > 0 ? pass.connections_at(2) : 0)),
           pixels(static_cast<uint32_t>(pixel_count)),
           samples(pixel_count * (pass.adaptive ? k_most_samples_a_pixel : 1)),
           finds(samples * (pass.guides ? sizeof(SampleFinds<GuidedSink>) : sizeof(SampleFinds<PixelSink>))) {

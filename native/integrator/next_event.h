@@ -36,9 +36,9 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
 
     const uint32_t n = eye.t + 1;
     const float dist_squared = event.distance * event.distance;
-    auto sum = strategy_sum<typename SumFor<See>::Type>(pass, strategy_count(pass, 1));
+    auto sum = strategy_sum<typename SumFor<See>::Type>(pass, strategy_count(pass, 1, eye.t));
     if (!event.delta && n <= pass.eye_path_length + 1) {
-        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0), false);
+        sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0, n));
     }
     if (pass.traces_light() && (eye.t > 2 || pass.splats)) {
         const LightEnd end =
@@ -47,7 +47,7 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
         add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, at_x_1.pdf_eye * eye.last().rev_geometry);
     }
     found.weight = sum.weight();
-    found.connection_share = sum.connection_share();
+    found.shares = sum.shares();
     return found;
 }
 

@@ -25,6 +25,7 @@ struct PassSettings {
     uint32_t light_paths = 0;        // N: leave VLPs
     uint32_t light_rounds = 1;       // R: so many times N light paths splat, and the first N of them leave VLPs
     uint32_t vlp_connections = 1;    // C
+    uint32_t first_times = 1;        // F: C F connections at the surface that the camera sees, C at others
     uint32_t vlp_candidates = 1;     // M: VLPs that each connection chooses from
     uint32_t light_samples = 1;      // S
     bool splats = false;             // joins light paths to the lens; wants L and N above 0
@@ -37,7 +38,7 @@ struct PassSettings {
     bool guides = false;             // gathers those of a denoiser, see guides.h
     bool adaptive = false;           // samples go where there is noise, see film/sample_rates.h
     uint32_t seed = 0;
-    float kappa = 0;  // C M N / V, V being what a pilot pass of the scene stored: how often a VLP is drawn
+    float kappa = 0;  // M N / V, V being what a pilot pass of the scene stored: how often a connection draws a VLP
     VlpGrid vlp_grid;  // where those of the pilot lay
     Filter filter = Filter::blackman_harris;
     float filter_width = 1.5f;  // full width (pixels)
@@ -45,6 +46,10 @@ struct PassSettings {
     // The limit on what a path of n vertices adds: direct light has met one surface at most.
     VLP_HD float clamp_of(uint32_t n) const { return n <= 3 ? clamp_direct : clamp_indirect; }
 
+    // At z_{t-1}.
+    VLP_HD uint32_t connections_at(uint32_t t) const {
+        return t == 2 ? vlp_connections * first_times : vlp_connections;
+    }
     VLP_HD uint32_t splat_paths() const { return light_rounds * light_paths; }
     // Whether an iteration has a light pass.
     VLP_HD bool traces_light() const { return kappa > 0 || splats; }

@@ -28,15 +28,15 @@ struct EyePath {
 };
 
 // The numbers of every step come from dimensions of their own, so that a path's later draws do not shift with its earlier
-// ones: one for each connection and two for each light sample, then direction, lobe and roulette.
+// ones: one for all connections and two for each light sample, then direction, lobe and roulette.
 struct StepDraws {
     uint32_t connections, lights, direction;
 
     VLP_HD StepDraws(const PassSettings& pass, uint32_t hits) {
-        const uint32_t at_vertex = pass.vlp_connections + 2 * pass.light_samples;
-        connections = 2 + (hits - 1) * (at_vertex + 3);
-        lights = connections + pass.vlp_connections;
-        direction = connections + at_vertex;
+        const uint32_t gathered = min_of(pass.vlp_connections, 1u) + 2 * pass.light_samples;
+        connections = 2 + (hits - 1) * (gathered + 3);
+        lights = connections + gathered - 2 * pass.light_samples;
+        direction = connections + gathered;
     }
 };
 
@@ -120,7 +120,7 @@ VLP_HD VLP_FORCE_INLINE Met arrive(const SceneView& scene, const PassSettings& p
 }
 
 // Joins the last vertex to lights and VLPs. `join(ShadowRay)` tells what gets through, and `join.add(Contribution)` takes
-// what was found, black or not: of S light samples, then of C connections where there are VLPs.
+// what was found, black or not: of S light samples, then of the connections where there are VLPs.
 template <typename Join>
 VLP_HD VLP_FORCE_INLINE void gather(const SceneView& scene, const PassSettings& pass, const LightVertexCache& cache,
                                     const EyePath& path, Sampler& sampler, Join& join) {
@@ -130,9 +130,12 @@ VLP_HD VLP_FORCE_INLINE void gather(const SceneView& scene, const PassSettings& 
     const bool has_vlps = connects(pass, cache);
     const StepDraws draws(pass, eye.t - 1);
     const Receiver receiver = has_vlps ? make_receiver(scene, pass, eye) : Receiver{};
+    const uint32_t connections = has_vlps ? pass.connections_at(eye.t) : 0;
+    sampler.dimension = draws.connections;
+    const SamplePair u = has_vlps ? sampler.next_pair() : SamplePair{};
     const auto choose = [&](uint32_t i) {
-        sampler.dimension = draws.connections + i;
-        const VlpChoice choice = choose_virtual_light_point(pass, cache, receiver, sampler.next_pair());
+        const VlpChoice choice =
+            choose_virtual_light_point(pass, cache, receiver, draw_of_connection(u, i, connections));
         prefetch_virtual_light_point(cache, choice);
         return choice;
     };
@@ -142,10 +145,12 @@ VLP_HD VLP_FORCE_INLINE void gather(const SceneView& scene, const PassSettings& 
         const uint32_t u_light = sampler.next_bits();
         join.add(sample_light(scene, pass, eye, bsdf, u_light, sampler.next_2d(), join));
     }
-    for (uint32_t i = 0; has_vlps && i < pass.vlp_connections; ++i) {
+    for (uint32_t i = 0; i < connections; ++i) {
         const VlpChoice vlp = next;
-        if (i + 1 < pass.vlp_connections) next = choose(i + 1);
-        join.add(connect_virtual_light_point(scene, pass, cache, eye, bsdf, vlp, join));
+        if (i + 1 < connections) next = choose(i + 1);
+        Contribution found = connect_virtual_light_point(scene, pass, cache, eye, bsdf, vlp, join);
+        found.number = i;
+        join.add(found);
     }
 }
 
@@ -201,7 +206,7 @@ VLP_HD inline float trace_eye_path(const SceneView& scene, const PassSettings& p
     for (;;) {
         if (connects(pass, cache)) {  // they take as long to come as the next surface
             sampler.dimension = StepDraws(pass, path.eye.t).connections;
-            prefetch_candidates(pass, cache, sampler.next_pair());
+            prefetch_candidates(pass, cache, sampler.next_pair(), pass.connections_at(path.eye.t + 1));
         }
         const Met met = arrive(scene, pass, path, find_closest(scene, path.way.ray, path.way.skip), sink);
         if (met == Met::nothing) break;

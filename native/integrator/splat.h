@@ -44,7 +44,7 @@ VLP_HD inline void connect_to_lens(const SceneView& scene, const PassSettings& p
     auto sum = strategy_sum<typename SumFor<Sink>::Type>(pass, splat_count(pass, s));
     add_shorter_light_walks(sum, pass, &y, s, s + 1, eye_pdf / y.pdf_area, at_y.pdf_light * y.rev_geometry);
     splat.found.weight = sum.weight();
-    splat.found.connection_share = sum.connection_share();
+    splat.found.shares = sum.shares();
     sink.add(splat);
 }
 

@@ -25,9 +25,11 @@ struct Contribution {
     uint32_t s = 0, t = 0;
     Rgb value{};
     float weight = 0;
-    // Told to sinks that want a ConnectionSum: what connections have of all strategies that could have made the path, and how
-    // many draws this one stands for, as it is kept from several.
-    float connection_share = 0, draws = 1;
+    // Told to sinks that want a ConnectionSum, beside the shares: how many draws this one stands for, as it is kept from several,
+    // and which connection of its vertex it is.
+    ConnectionShares shares{};
+    float draws = 1;
+    uint32_t number = 0;
     uint32_t light = k_none;  // s < 2: the light, and the point y_0 (the direction to it where it is infinite)
     Vec3 position{}, normal{};
     const LightVertex* vlp = nullptr;  // s >= 2: y_{s-1}
@@ -51,7 +53,7 @@ VLP_HD inline Sum connection_sum(const PassSettings& pass, const EyeWalk& eye, c
                                  const LightVertex* vlp, const LobeValue& at_vlp, const Edge& edge, float cos_eye,
                                  float cos_vlp) {
     const uint32_t s = vlp->index() + 1, n = s + eye.t;
-    Sum sum = strategy_sum<Sum>(pass, strategy_count(pass, s), true);
+    Sum sum = strategy_sum<Sum>(pass, strategy_count(pass, s, eye.t), eye.t);
     const float light_pdf = at_vlp.pdf_eye * cos_eye / edge.dist_squared;
     add_longer_light_walks(sum, pass, eye.vertices, n, s + 1, light_pdf / eye.last().pdf_area,
                            at_eye.pdf_eye * eye.last().rev_geometry);
@@ -91,7 +93,7 @@ VLP_HD inline VlpConnection join_unshadowed(const SceneView& scene, const PassSe
     found.value = eye.throughput * at_eye.f * at_vlp.f * vlp->throughput * (geometry * paths);
     const Sum sum = connection_sum<Sum>(pass, eye, at_eye, vlp, at_vlp, edge, cos_eye, cos_vlp);
     found.weight = sum.weight();
-    found.connection_share = sum.connection_share();
+    found.shares = sum.shares();
     if constexpr (std::is_same_v<Sum, ConnectionSum>) {
         found.draws = choice.stands_for / static_cast<float>(cache.hand_count);
     }
@@ -112,14 +114,18 @@ VLP_HD inline void prefetch_virtual_light_point([[maybe_unused]] const LightVert
 VLP_HD inline Receiver make_receiver(const SceneView& scene, const PassSettings& pass, const EyeWalk& eye) {
     const Material& material = scene.materials[eye.surface.material];
     const float cos_previous = dot(eye.surface.geometric_normal, eye.w_eye);
-    StrategySum sum = sum_of_promises(pass, 2);
+    StrategySum sum = sum_of_promises(pass, 2, eye.t);
     add_longer_light_walks(sum, pass, eye.vertices, eye.t + 2, 3, k_inv_pi / eye.last().pdf_area,
                            std::fabs(cos_previous) * k_inv_pi * eye.last().rev_geometry);
-    return {eye.surface.position, eye.surface.geometric_normal * (cos_previous < 0 ? -1.0f : 1.0f),
-            detail::share_behind(material), eye.throughput * material.albedo, sum.sum - 1};
+    return {eye.surface.position,
+            eye.surface.geometric_normal * (cos_previous < 0 ? -1.0f : 1.0f),
+            detail::share_behind(material),
+            eye.throughput * material.albedo,
+            sum.sum - 1,
+            1 / static_cast<float>(eye.t == 2 ? pass.first_times : 1)};
 }
 
-// One of the C connections at z_{t-1}, to the VLP that was chosen, by a ray that `see` sends. The estimate is of what all VLPs of
+// One of the connections at z_{t-1}, to the VLP that was chosen, by a ray that `see` sends. The estimate is of what all VLPs of
 // an iteration bring, and this is its share of it.
 template <typename See>
 VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, const PassSettings& pass,
@@ -129,7 +135,7 @@ VLP_HD inline Contribution connect_virtual_light_point(const SceneView& scene, c
     VlpConnection joined = join_unshadowed<typename SumFor<See>::Type>(scene, pass, cache, eye, eye_bsdf, choice);
     if (is_black(joined.found.value)) return joined.found;
     const Rgb through = see(shadow_ray(anchor_of(eye.surface), joined.vlp, joined.direction));
-    joined.found.value *= 1.0f / static_cast<float>(pass.vlp_connections);
+    joined.found.value *= 1.0f / static_cast<float>(pass.connections_at(eye.t));
     joined.found.value *= through;
     return joined.found;
 }

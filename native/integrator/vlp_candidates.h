@@ -17,6 +17,7 @@ struct Receiver {
     float behind;  // share of the light from the other side that counts
     Rgb wanted;  // what reflected light is multiplied by
     float others;  // as VlpCandidate::others, for the strategies of more light vertices
+    float scale;  // of VlpCandidate::others: less where there are more connections
 };
 
 namespace detail {
@@ -35,12 +36,12 @@ VLP_HD inline float second_half(uint32_t halves) { return float_of(static_cast<i
 
 // Promises are weighted by the balance heuristic whatever the weights are: its sums are linear in the densities, so that what
 // is known of either end alone can be summed before they meet.
-VLP_HD inline StrategySum sum_of_promises(const PassSettings& pass, uint32_t s) {
-    return {Weighting::balance, strategy_count(pass, s)};
+VLP_HD inline StrategySum sum_of_promises(const PassSettings& pass, uint32_t s, uint32_t t) {
+    return {Weighting::balance, strategy_count(pass, s, t)};
 }
 
-// The VLP in `slot`. Strategies of fewer light vertices than the connection have, in sum, others * |cos cos| / dist^2 times its
-// density if both surfaces are Lambertian; others is in m^2.
+// The VLP in `slot`. Strategies of fewer light vertices than a connection have, in sum, others * |cos cos| / dist^2 times the
+// density of C connections if both surfaces are Lambertian; others is in m^2.
 VLP_HD inline VlpCandidate make_candidate(const SceneView& scene, const PassSettings& pass, const LightVertex* slots,
                                           uint32_t slot) {
     const LightVertex& vlp = slots[slot];
@@ -48,8 +49,8 @@ VLP_HD inline VlpCandidate make_candidate(const SceneView& scene, const PassSett
     const Vec3 normal = decode(vlp.geometric_normal);
     const float cos_previous = dot(normal, decode(vlp.to_previous));
     const uint32_t s = vlp.index() + 1;
-    StrategySum sum = sum_of_promises(pass, s);
-    add_shorter_light_walks(sum, pass, &vlp, s, s + 1, k_inv_pi / vlp.pdf_area,
+    StrategySum sum = sum_of_promises(pass, s, 3);
+    add_shorter_light_walks(sum, pass, &vlp, s, s + 2, k_inv_pi / vlp.pdf_area,
                             std::fabs(cos_previous) * k_inv_pi * vlp.rev_geometry);
     const Rgb reflected = vlp.throughput * material.albedo;
     return {vlp.position,
@@ -103,7 +104,7 @@ VLP_FORCE_INLINE void transpose(__m256 (&r)[8]) {
 
 }  // namespace detail
 
-// promises[i]: that of list[i], for i below `count`, which is k_candidates_at_once at most. There is room for as many.
+// promises[i]: that of list[i], for i below `count`, which is k_candidates_at_once at most; 0 for the others up to there.
 VLP_FORCE_INLINE void promise(const Receiver& to, const VlpCandidate* list, uint32_t count, float* promises) {
     static_assert(sizeof(VlpCandidate) == sizeof(__m256));
     const auto all = [](float x) { return _mm256_set1_ps(x); };
@@ -138,10 +139,36 @@ VLP_FORCE_INLINE void promise(const Receiver& to, const VlpCandidate* list, uint
     const __m256 light =
         _mm256_fmadd_ps(all(to.wanted.r), row[4],
                         _mm256_fmadd_ps(all(to.wanted.g), upper(row[4]), _mm256_mul_ps(all(to.wanted.b), row[5])));
-    const __m256 others = _mm256_add_ps(row[6], all(to.others));
+    const __m256 others = _mm256_fmadd_ps(row[6], all(to.scale), all(to.others));
     const __m256 weighted = _mm256_div_ps(_mm256_mul_ps(light, geometry), _mm256_fmadd_ps(others, geometry, all(1)));
+    const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    const __m256 there = _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_set1_epi32(static_cast<int>(count)), lanes));
     // In this order NaN becomes 0.
-    _mm256_storeu_ps(promises, _mm256_min_ps(_mm256_max_ps(weighted, all(0)), all(k_most_promise)));
+    const __m256 bounded = _mm256_min_ps(_mm256_max_ps(weighted, all(0)), all(k_most_promise));
+    _mm256_storeu_ps(promises, _mm256_and_ps(bounded, there));
+}
+
+// begins[i] = promises[0] + ... + promises[i - 1]. Returns the sum of all.
+VLP_FORCE_INLINE float line_up(const float* promises, float* begins) {
+    const auto shifted = [](__m256 x, auto by) {
+        return _mm256_castsi256_ps(_mm256_bslli_epi128(_mm256_castps_si256(x), decltype(by)::value));
+    };
+    const __m256 own = _mm256_loadu_ps(promises);
+    __m256 sums = _mm256_add_ps(own, shifted(own, std::integral_constant<int, 4>{}));
+    sums = _mm256_add_ps(sums, shifted(sums, std::integral_constant<int, 8>{}));
+    const __m256 low = _mm256_permute2f128_ps(sums, sums, 0x08);  // the low half above, 0 below
+    sums = _mm256_add_ps(sums, _mm256_permute_ps(low, 0xff));
+    const __m256 before = _mm256_permutevar8x32_ps(sums, _mm256_setr_epi32(7, 0, 1, 2, 3, 4, 5, 6));
+    _mm256_storeu_ps(begins, _mm256_blend_ps(before, _mm256_setzero_ps(), 1));
+    return _mm256_cvtss_f32(before);
+}
+
+// The last that begins at or before `at` and has some width.
+VLP_FORCE_INLINE uint32_t last_begun(const float* promises, const float* begins, float at) {
+    const __m256 begun = _mm256_cmp_ps(_mm256_loadu_ps(begins), _mm256_set1_ps(at), _CMP_LE_OQ);
+    const __m256 wide = _mm256_cmp_ps(_mm256_loadu_ps(promises), _mm256_setzero_ps(), _CMP_GT_OQ);
+    const auto mask = static_cast<uint32_t>(_mm256_movemask_ps(_mm256_and_ps(begun, wide)));
+    return 31 - static_cast<uint32_t>(__builtin_clz(mask | 1u));
 }
 
 #else
@@ -158,9 +185,25 @@ VLP_HD inline void promise(const Receiver& to, const VlpCandidate* list, uint32_
                             detail::first_half(c.blue_and_behind)};
         const Rgb brought = reflected * to.wanted;
         const float light = brought.r + brought.g + brought.b;
-        const float weighted = light * geometry / (1 + (c.others + to.others) * geometry);
+        const float weighted = light * geometry / (1 + (c.others * to.scale + to.others) * geometry);
         promises[i] = weighted > 0 ? min_of(weighted, k_most_promise) : 0.0f;
     }
+    for (uint32_t i = count; i < k_candidates_at_once; ++i) promises[i] = 0;
+}
+
+VLP_HD inline float line_up(const float* promises, float* begins) {
+    float sum = 0;
+    for (uint32_t i = 0; i < k_candidates_at_once; ++i) {
+        begins[i] = sum;
+        sum += promises[i];
+    }
+    return sum;
+}
+
+VLP_HD inline uint32_t last_begun(const float* promises, const float* begins, float at) {
+    uint32_t last = 0;
+    for (uint32_t i = 0; i < k_candidates_at_once; ++i) last = begins[i] <= at && promises[i] > 0 ? i : last;
+    return last;
 }
 
 #endif
@@ -171,12 +214,22 @@ VLP_HD inline const VlpCandidate* deal(const PassSettings& pass, const LightVert
     return cache.stored + size_t{hand} * pass.vlp_candidates;
 }
 
-// Asks for the memory of the candidates that `u.x` draws: their hand lies anywhere.
+// What connection `i` of `count` at a vertex draws by, for `u` of the vertex: each has its part of the hands.
+VLP_HD inline SamplePair draw_of_connection(SamplePair u, uint32_t i, uint32_t count) {
+    if (count == 1) return u;
+    return {static_cast<uint32_t>((uint64_t{i} << 32 | u.x) / count), u.y + reverse_bits(i)};
+}
+
+// Asks for the memory of the candidates of `count` connections, or of the first of them: their hands lie anywhere.
 VLP_HD inline void prefetch_candidates([[maybe_unused]] const PassSettings& pass,
-                                       [[maybe_unused]] const LightVertexCache& cache, [[maybe_unused]] SamplePair u) {
+                                       [[maybe_unused]] const LightVertexCache& cache, [[maybe_unused]] SamplePair u,
+                                       [[maybe_unused]] uint32_t count) {
 #if !VLP_ON_DEVICE
-    const VlpCandidate* const hand = deal(pass, cache, u.x);
-    for (uint32_t i = 0; i < pass.vlp_candidates; i += 64 / sizeof(VlpCandidate)) __builtin_prefetch(hand + i);
+    constexpr uint32_t k_most_hands = 4;
+    for (uint32_t i = 0; i < min_of(count, k_most_hands); ++i) {
+        const VlpCandidate* const hand = deal(pass, cache, draw_of_connection(u, i, count).x);
+        for (uint32_t k = 0; k < pass.vlp_candidates; k += 64 / sizeof(VlpCandidate)) __builtin_prefetch(hand + k);
+    }
 #endif
 }
 
@@ -196,10 +249,9 @@ VLP_HD inline VlpChoice choose_virtual_light_point(const PassSettings& pass, con
     float u_keep = unit_float(u.y), kept_promise = 0, sum = 0;
     for (uint32_t first = 0; first < pass.vlp_candidates; first += k_candidates_at_once) {
         const uint32_t count = min_of(pass.vlp_candidates - first, k_candidates_at_once);
-        float promises[k_candidates_at_once];
+        float promises[k_candidates_at_once], begins[k_candidates_at_once];
         promise(receiver, hand + first, count, promises);
-        float here = 0;
-        for (uint32_t i = 0; i < count; ++i) here += promises[i];
+        const float here = line_up(promises, begins);
         if (!(here > 0)) continue;
         sum += here;
         const float chance = here / sum;
@@ -207,19 +259,11 @@ VLP_HD inline VlpChoice choose_virtual_light_point(const PassSettings& pass, con
             u_keep = (u_keep - chance) / (1 - chance);
             continue;
         }
-        // The last that begins at or before `at` and has some width.
         const float at = u_keep * sum;
-        float begin = 0, kept_begin = 0;
-        uint32_t lane = 0;
-        for (uint32_t i = 0; i < count; ++i) {
-            const bool keep = begin <= at && promises[i] > 0;
-            lane = keep ? i : lane;
-            kept_begin = keep ? begin : kept_begin;
-            begin += promises[i];
-        }
+        const uint32_t lane = last_begun(promises, begins, at);
         kept_promise = promises[lane];
         kept.slot = hand[first + lane].slot;
-        u_keep = (at - kept_begin) / kept_promise;
+        u_keep = (at - begins[lane]) / kept_promise;
     }
     if (kept_promise > 0) kept.stands_for = hands * sum / kept_promise;
     return kept;

@@ -24,11 +24,11 @@ namespace vlp {
 // say. Any count is unbiased.
 inline constexpr float k_hit_worth = 0.5f;
 
-// How often an iteration draws a strategy for a pixel: hits once, S light samples, kappa draws of a virtual light point.
-// 0: it is switched off. Those with t = 1 are counted by splat_count.
-VLP_HD inline float strategy_count(const PassSettings& pass, uint32_t s) {
+// How often an iteration draws strategy (s, t) for a pixel: hits once, S light samples, kappa draws of a virtual light point
+// by each connection. 0: it is switched off. Those with t = 1 are counted by splat_count.
+VLP_HD inline float strategy_count(const PassSettings& pass, uint32_t s, uint32_t t) {
     if (s == 0) return pass.hits ? k_hit_worth : 0.0f;
-    return s == 1 ? static_cast<float>(pass.light_samples) : pass.kappa;
+    return s == 1 ? static_cast<float>(pass.light_samples) : pass.kappa * static_cast<float>(pass.connections_at(t));
 }
 
 // Whether the vertices y_i of light paths splat. Those of direct light, i = 1, do so only where there is no next event,
@@ -42,14 +42,20 @@ VLP_HD inline float splat_count(const PassSettings& pass, uint32_t s) {
     return splats_from(pass, s - 1) ? static_cast<float>(pass.splat_paths()) : 0.0f;
 }
 
+// What connections to VLPs have of all strategies that could have made a path, and what those at z_1 alone have.
+struct ConnectionShares {
+    float all = 0, first = 0;
+};
+
 // Sums what the other strategies have relative to the one at hand.
 struct StrategySum {
     Weighting weighting;
     float own_count;
     float sum = 1;
 
-    // `ratio` = density of the other strategy over the density of this one, without the counts.
-    VLP_HD void add(float ratio, float count, bool = false) {
+    // `ratio` = density of the other strategy over the density of this one, without the counts. `connection`: t, if it is a
+    // connection to a VLP.
+    VLP_HD void add(float ratio, float count, uint32_t /*connection*/ = 0) {
         const float relative = ratio * count / own_count;
         switch (weighting) {
             case Weighting::uniform:
@@ -64,21 +70,28 @@ struct StrategySum {
         }
     }
     VLP_HD float weight() const { return 1.0f / sum; }
-    VLP_HD float connection_share() const { return 0; }  // nobody asks
+    VLP_HD ConnectionShares shares() const { return {}; }  // nobody asks
 };
 
 // The same, with what connections to VLPs have of it.
 struct ConnectionSum {
     StrategySum all;
-    float connections;
+    float connections = 0, first = 0;
 
-    VLP_HD void add(float ratio, float count, bool is_connection) {
+    VLP_HD ConnectionSum(const StrategySum& own, uint32_t connection) : all(own) { count(own.sum, connection); }
+    VLP_HD void add(float ratio, float count_, uint32_t connection = 0) {
         const float before = all.sum;
-        all.add(ratio, count);
-        if (is_connection) connections += all.sum - before;
+        all.add(ratio, count_);
+        count(all.sum - before, connection);
     }
     VLP_HD float weight() const { return all.weight(); }
-    VLP_HD float connection_share() const { return connections / all.sum; }
+    VLP_HD ConnectionShares shares() const { return {connections / all.sum, first / all.sum}; }
+
+private:
+    VLP_HD void count(float part, uint32_t connection) {
+        if (connection > 0) connections += part;
+        if (connection == 2) first += part;
+    }
 };
 
 // The one that a sink of contributions asks for as its `Sum`; by default only weights.
@@ -93,10 +106,10 @@ struct SumFor<Sink> {
 };
 
 template <typename Sum = StrategySum>
-VLP_HD inline Sum strategy_sum(const PassSettings& pass, float own_count, [[maybe_unused]] bool is_connection = false) {
+VLP_HD inline Sum strategy_sum(const PassSettings& pass, float own_count, [[maybe_unused]] uint32_t connection = 0) {
     const StrategySum own{pass.weighting, own_count};
     if constexpr (std::is_same_v<Sum, ConnectionSum>) {
-        return {own, is_connection ? 1.0f : 0.0f};
+        return {own, connection};
     } else {
         return own;
     }
@@ -112,7 +125,7 @@ VLP_HD inline void add_longer_light_walks(Sum& sum, const PassSettings& pass, co
     for (uint32_t k = k_first; k <= pass.light_path_length + 1 && k + t_least <= n && ratio > 0; ++k) {
         const VertexDensity &end = eye[n - 1 - k], &freed = eye[n - k];  // x_k and x_{k-1}
         if (!end.specular && !freed.specular)
-            sum.add(ratio, k + 1 < n ? strategy_count(pass, k) : splat_count(pass, k), k + 1 < n);
+            sum.add(ratio, k + 1 < n ? strategy_count(pass, k, n - k) : splat_count(pass, k), k + 1 < n ? n - k : 0);
         ratio *= k == k_first ? next_ratio : freed.rev_ratio;
     }
 }
@@ -125,14 +138,14 @@ VLP_HD inline void add_shorter_light_walks(Sum& sum, const PassSettings& pass, c
     const LightVertex* freed = vlp;  // x_k = y_k, free of the light walk from strategy k on
     for (uint32_t k = s - 1; n - k <= pass.eye_path_length + 1 && ratio > 0; --k, --freed) {
         if (k == 0) {  // y_0 has no slot: `freed` must not be looked at
-            sum.add(ratio, strategy_count(pass, 0), false);
+            sum.add(ratio, strategy_count(pass, 0, n));
             return;
         }
         const bool finite = freed == vlp || !freed->specular();
         if (k == 1) {
-            if (finite) sum.add(ratio * freed->next_event_ratio, strategy_count(pass, 1), false);
+            if (finite) sum.add(ratio * freed->next_event_ratio, strategy_count(pass, 1, n - 1));
         } else if (finite && !freed[-1].specular()) {
-            sum.add(ratio, strategy_count(pass, k), true);
+            sum.add(ratio, strategy_count(pass, k, n - k), n - k);
         }
         ratio *= freed == vlp ? next_ratio : freed->rev_ratio;
     }

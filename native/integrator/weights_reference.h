@@ -164,7 +164,9 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
         if (k == 2 && n == 3 && pass.light_samples > 0) continue;  // direct light is left to next event
         if (k == 1 && x_1.specular) continue;
         if (k >= 2 && (path.x[k - 1].specular || path.x[k].specular)) continue;
-        double density = k == 0 ? 0.5 : k == 1 ? double(pass.light_samples) : double{pass.kappa};
+        double density = k == 0   ? 0.5
+                         : k == 1 ? double(pass.light_samples)
+                                  : double{pass.kappa} * pass.connections_at(n - k);
         if (k > 0 && k == n - 1) density = double(pass.splat_paths());
         for (uint32_t i = 0; i < n; ++i) density *= i >= k ? by_eye[i] : k == 1 ? next_event : by_light[i];
         densities[k] = density;

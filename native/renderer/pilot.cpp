@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -75,18 +76,24 @@ bool finds_all_unconnected(const SceneView& scene, const PassSettings& pass) {
     return std::none_of(scene.lights, scene.lights + scene.light_count, [](const Light& l) { return is_delta(l); });
 }
 
-// As a trial finds it best: how many light paths splat, and no connections where they bring less than they take.
+// As a trial finds it best: how many light paths splat, how many connections the surface that the camera sees has, and none at
+// all where they bring less than they take.
 PassSettings as_it_pays(const SceneView& scene, PassSettings pass, ThreadPool& pool) {
     // What connections have to win: part of what the trial counts against a render without them would fall to splats.
     constexpr double k_least_gain = 1.05;
     constexpr uint32_t k_most_rounds = 8, k_most_paths = 1u << 31;
-    pass.light_rounds = 1;
+    pass.light_rounds = pass.first_times = 1;
     const Trial trial = try_out(scene, pass, pool);
     const uint32_t most = pass.splats ? std::min(k_most_rounds, k_most_paths / pass.light_paths) : 1;
-    const uint32_t asked = trial.as_asked.best_rounds(most), unconnected = trial.unconnected.best_rounds(most);
-    pass.light_rounds = asked;
+    double least = std::numeric_limits<double>::infinity();
+    for (uint32_t option = 0; option < trial.connected.size(); ++option) {
+        const uint32_t rounds = trial.connected[option].best_rounds(most);
+        const double here = trial.connected[option].inverse_efficiency(rounds);
+        if (here < least) least = here, pass.light_rounds = rounds, pass.first_times = 1u << option;
+    }
     if (pass.kappa == 0 || !finds_all_unconnected(scene, pass)) return pass;
-    if (trial.unconnected.inverse_efficiency(unconnected) < k_least_gain * trial.as_asked.inverse_efficiency(asked)) {
+    const uint32_t unconnected = trial.unconnected.best_rounds(most);
+    if (trial.unconnected.inverse_efficiency(unconnected) < k_least_gain * least) {
         pass.kappa = 0;
         pass.light_rounds = unconnected;
         pass.eye_path_length += pass.light_path_length + 1;  // paths that were made of two become one
@@ -104,7 +111,7 @@ PassSettings for_scene(const SceneView& scene, PassSettings pass, unsigned threa
     if (pass.vlp_connections > 0 && light_walks) {
         const Pilot pilot = trace_pilot(scene, pass, pool);
         if (pilot.vlps_per_path > 0)
-            pass.kappa = static_cast<float>(pass.vlp_connections * pass.vlp_candidates) / pilot.vlps_per_path;
+            pass.kappa = static_cast<float>(pass.vlp_candidates) / pilot.vlps_per_path;
         pass.vlp_grid = pilot.grid;
     }
     if (!pass.adaptive || !pass.traces_light() || pass.weighting != Weighting::balance) return pass;

@@ -4,6 +4,9 @@
 // counts. The square of it is f^2 / p on average. Without connections p is less by their share of it, and the square 1 / (1 -
 // share) times as large. So what a render without connections would be like follows from one with them, and precisely where
 // it matters: connections find the rare bright paths that such a render would seldom meet.
+//
+// By the same rule a trial with F times the connections at z_1 tells of every smaller F' what each find would be there: p is less
+// by (1 - F' / F) of the share that those connections have, and of them every F / F'-th is made.
 #include "renderer/trial.h"
 
 #include <algorithm>
@@ -20,13 +23,15 @@ namespace {
 constexpr uint32_t k_rounds = 8;  // each with one path through every pixel that is looked at
 constexpr uint32_t k_light_paths = 512;  // in each round, at most
 constexpr int k_around = 2;  // pixels to each side whose noise is taken together
+constexpr uint32_t k_options = 4;  // F = 1, 2, 4, 8
 constexpr double k_most_times = 30;  // as large as usual that a find counts at most: more of it is chance
 constexpr float k_most_growth = 1000;  // of a square without connections: a render will not meet what comes more seldom
 
-// In steps of an eye walk. Of several candidates hardly any is kept that no shadow ray is sent to. A light vertex has a ray to
-// the lens, and is listed.
-double connection_cost(const PassSettings& pass) {
-    return pass.vlp_connections * (pass.vlp_candidates == 1 ? 0.65 : 1.2 + 0.006 * pass.vlp_candidates);
+// Of `connections` at a surface, in steps of an eye walk. Of several candidates hardly any is kept that no shadow ray is sent to.
+// A light vertex has a ray to the lens, and is listed.
+double connection_cost(const PassSettings& pass, uint32_t connections) {
+    if (connections == 0) return 0;
+    return pass.vlp_candidates == 1 ? 0.65 * connections : 0.35 + (0.85 + 0.006 * pass.vlp_candidates) * connections;
 }
 constexpr double k_light_vertex_cost = 2;
 
@@ -70,14 +75,20 @@ private:
 
 // Something that was found: what it adds to a pixel, and by what share its square would grow without connections.
 struct Find {
-    float light = 0, growth = 0;
+    float light = 0, limit = 0, first_share = 0, growth = 0;
 
     Find(const PassSettings& pass, const Contribution& c, float scale) {
         const Rgb found = c.value * (c.weight * scale);
         if (!is_finite(found)) return;
-        light = average(clamped(pass, c.s + c.t, found));
-        const float left = (1 - c.connection_share) * c.draws;
+        light = average(found), limit = pass.clamp_of(c.s + c.t);
+        first_share = c.shares.first;
+        const float left = (1 - c.shares.all) * c.draws;
         growth = (left > 1 / k_most_growth ? 1 / left : k_most_growth) - 1;
+    }
+    // With `kept` of the connections at z_1.
+    float with(float kept) const {
+        const float there = light / (1 - first_share * (1 - kept));
+        return limit > 0 ? min_of(there, limit) : there;
     }
 };
 
@@ -88,18 +99,27 @@ struct TriedPath {
     const SceneView& scene;
     const PassSettings& pass;
     float scale;  // light paths of an iteration for each of the trial
-    float light = 0;
-    double growth = 0;  // of the square
+    uint32_t number;  // of the round: which connections are kept where not all are
+    float light[k_options]{};  // with F = 1, 2, 4, 8 of the connections at z_1
+    double growth = 0;  // of the square, with all
     uint32_t steps = 1, joined = 0;  // joined: surfaces that connections begin at
+    bool first_joined = false;  // z_1 is one
 
     void visit(const EyeWalk& eye) {
         ++steps;
-        if (scene.materials[eye.surface.material].has_finite) ++joined;
+        if (!scene.materials[eye.surface.material].has_finite) return;
+        ++joined;
+        if (eye.t == 2) first_joined = true;
     }
     void add(const Contribution& c) {
         const Find find(pass, c, c.s >= 2 ? scale : 1.0f);
-        light += find.light;
-        growth += static_cast<double>(find.growth) * find.light * find.light;
+        for (uint32_t option = 0; option < k_options; ++option) {
+            const uint32_t times = 1u << option, every = max_of(pass.first_times / times, 1u);
+            if (c.s >= 2 && c.t == 2 && c.number % every != number % every) continue;
+            light[option] += find.with(1.0f / static_cast<float>(every));
+        }
+        const auto all = static_cast<double>(find.with(1));
+        growth += static_cast<double>(find.growth) * all * all;
     }
 };
 
@@ -150,7 +170,7 @@ Round run_round(const SceneView& scene, PassSettings pass, const Cells& cells, u
 
     round.paths.reserve(cells.count());
     for (size_t i = 0; i < cells.count(); ++i) {
-        TriedPath& path = round.paths.emplace_back(scene, pass, light_scale(pass));
+        TriedPath& path = round.paths.emplace_back(scene, pass, light_scale(pass), number);
         trace_eye_path(scene, pass, cache, {}, cells.x_of(i), cells.y_of(i), path);
     }
     return round;
@@ -176,24 +196,29 @@ public:
         : pass_(pass), cells_(cells), rounds_(rounds), level_(cells.count()) {
         std::vector<double> mean(cells.count());
         for (const Round& round : rounds) {
-            for (size_t i = 0; i < mean.size(); ++i) mean[i] += static_cast<double>(round.paths[i].light) / k_rounds;
+            for (size_t i = 0; i < mean.size(); ++i) mean[i] += light(round.paths[i], k_options - 1) / k_rounds;
             for (const auto& splat : round.splats) {
-                mean[splat.cell] += static_cast<double>(splat.find.light) * splats_in_pixel() / k_rounds;
+                mean[splat.cell] += static_cast<double>(splat.find.with(1)) * splats_in_pixel() / k_rounds;
             }
         }
         for (size_t i = 0; i < level_.size(); ++i) level_[i] = 0.1 + std::max(mean[i], cells.around(i, mean));
     }
 
-    Prospect prospect(bool connected) const {
+    // With F = 2^option, or without connections.
+    Prospect connected(uint32_t option) const { return prospect(option, true); }
+    Prospect unconnected() const { return prospect(k_options - 1, false); }
+
+private:
+    Prospect prospect(uint32_t option, bool connected) const {
         const auto count = static_cast<double>(cells_.count());
         Prospect sum;
         std::vector<double> variance(cells_.count());
         double weights = 0;
         for (size_t i = 0; i < cells_.count(); ++i) {
             // Adaptive sampling gives a pixel samples by its deviation, so they cost what they do where there is noise.
-            variance[i] = relative_variance(i, connected);
+            variance[i] = relative_variance(i, option, connected);
             const double weight = std::sqrt(variance[i]);
-            weights += weight, sum.eye_cost += weight * cost(i, connected);
+            weights += weight, sum.eye_cost += weight * cost(i, connected ? 1u << option : 0);
         }
         sum.eye_cost = weights > 0 ? sum.eye_cost / weights : 1;
         // And what counts is the mean of deviations. Eight rounds say little of one pixel's.
@@ -203,13 +228,13 @@ public:
         for (const Round& round : rounds_) {
             vertices += round.light_vertices / static_cast<double>(k_rounds);
             splats += static_cast<double>(round.splats.size());
-            for (const auto& splat : round.splats) relative_light += relative(splat);
+            for (const auto& splat : round.splats) relative_light += relative(splat, option);
         }
         // Where few splats fall each is bright, and not by chance.
         const double most = k_most_times * std::max(1.0, splats > 0 ? relative_light / splats : 0.0);
         for (const Round& round : rounds_) {
             for (const auto& splat : round.splats) {
-                const double light = std::min(relative(splat), most);
+                const double light = std::min(relative(splat, option), most);
                 const double growth = connected ? 1.0 : 1.0 + static_cast<double>(splat.find.growth);
                 sum.splat_variance += light * light * growth * splats_in_pixel() / (count * k_rounds);
             }
@@ -219,28 +244,36 @@ public:
         return sum;
     }
 
-private:
-    double relative(const TriedSplats::Fallen& splat) const {
-        return static_cast<double>(splat.find.light) / level_[splat.cell];
+    // What part of the trial's connections at z_1 the option has.
+    float kept(uint32_t option) const {
+        return min_of(static_cast<float>(1u << option) / static_cast<float>(pass_.first_times), 1.0f);
     }
+    double relative(const TriedSplats::Fallen& splat, uint32_t option) const {
+        return static_cast<double>(splat.find.with(kept(option))) / level_[splat.cell];
+    }
+    static double light(const TriedPath& path, uint32_t option) { return static_cast<double>(path.light[option]); }
     // Those that fall on a pixel in an iteration, for each that fell on its cell in a round.
     double splats_in_pixel() const { return static_cast<double>(light_scale(pass_)) / cells_.pixels_each(); }
 
-    double cost(size_t cell, bool connected) const {
+    // F = `times`; 0: without connections.
+    double cost(size_t cell, uint32_t times) const {
+        const uint32_t connections = times > 0 ? pass_.vlp_connections : 0;
         double sum = 0;
         for (const Round& round : rounds_) {
             const TriedPath& path = round.paths[cell];
-            sum += path.steps + (connected ? path.joined * connection_cost(pass_) : 0.0);
+            const uint32_t first = path.first_joined ? 1 : 0;
+            sum += path.steps + (path.joined - first) * connection_cost(pass_, connections) +
+                   first * connection_cost(pass_, connections * times);
         }
         return sum / k_rounds;
     }
-    double relative_variance(size_t cell, bool connected) const {
+    double relative_variance(size_t cell, uint32_t option, bool connected) const {
         double sum = 0, squares = 0, growth = 0;
         for (const Round& round : rounds_) {
             const TriedPath& path = round.paths[cell];
-            const double found = static_cast<double>(path.light), light = std::min(found, k_most_times * level_[cell]);
-            sum += light, squares += light * light;
-            growth += path.growth * (light < found ? (light / found) * (light / found) : 1.0);
+            const double found = light(path, option), counted = std::min(found, k_most_times * level_[cell]);
+            sum += counted, squares += counted * counted;
+            growth += path.growth * (counted < found ? (counted / found) * (counted / found) : 1.0);
         }
         double variance = (squares - sum * sum / k_rounds) / (k_rounds - 1);
         if (!connected) variance += growth / k_rounds;
@@ -263,12 +296,16 @@ uint32_t Prospect::best_rounds(uint32_t most) const {
     return best;
 }
 
-Trial try_out(const SceneView& scene, const PassSettings& pass, ThreadPool& pool) {
+Trial try_out(const SceneView& scene, PassSettings pass, ThreadPool& pool) {
     const Cells cells(scene.camera);
+    const uint32_t options = pass.kappa > 0 ? k_options : 1;
+    pass.first_times = 1u << (options - 1);
     std::vector<Round> rounds(k_rounds);
     pool.run(k_rounds, [&](uint32_t i) { rounds[i] = run_round(scene, pass, cells, i); });
     const Reckoning reckoning(pass, cells, rounds);
-    return {reckoning.prospect(true), reckoning.prospect(false)};
+    Trial trial{{}, reckoning.unconnected()};
+    for (uint32_t option = 0; option < options; ++option) trial.connected.push_back(reckoning.connected(option));
+    return trial;
 }
 
 }  // namespace vlp

@@ -1,6 +1,8 @@
 // What settings are worth in a scene, found out by a few paths with random numbers of their own (host only).
 #pragma once
 
+#include <vector>
+
 #include "core/parallel.h"
 #include "integrator/pass.h"
 
@@ -21,10 +23,11 @@ struct Prospect {
 };
 
 struct Trial {
-    Prospect as_asked, unconnected;  // the latter without connections to VLPs
+    std::vector<Prospect> connected;  // with F = 1, 2, 4 and 8; 1 alone where there are no VLPs
+    Prospect unconnected;  // without connections to VLPs
 };
 
-// `pass` as for_scene gives it, with R = 1 and the balance heuristic. The same on every machine, however many threads.
-Trial try_out(const SceneView& scene, const PassSettings& pass, ThreadPool& pool);
+// `pass` as for_scene gives it, with R = F = 1 and the balance heuristic. The same on every machine, however many threads.
+Trial try_out(const SceneView& scene, PassSettings pass, ThreadPool& pool);
 
 }  // namespace vlp

@@ -18,7 +18,7 @@ bool can_make(const SceneView& scene, const PassSettings& pass, const EyeWalk& e
               uint32_t k) {
     const uint32_t n = found.s + found.t;
     if (n - k > pass.eye_path_length + 1 || k > pass.light_path_length + 1) return false;
-    if ((k + 1 < n ? strategy_count(pass, k) : splat_count(pass, k)) <= 0) return false;
+    if ((k + 1 < n ? strategy_count(pass, k, n - k) : splat_count(pass, k)) <= 0) return false;
     const auto specular = [&](uint32_t i) { return i + 1 < n && i > 0 && eye.vertices[n - 1 - i].specular; };
     if (found.light == k_none) return k == 0;  // an emitter that only hits can find
     if (k == 0) return !is_delta(scene.lights[found.light]);

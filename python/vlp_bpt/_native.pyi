@@ -142,6 +142,8 @@ class Renderer:
     @property
     def light_rounds(self) -> int: ...  # R: how many times the paths that leave VLPs
     @property
+    def first_connections(self) -> int: ...  # C F; 0 where none are made
+    @property
     def paths(self) -> int: ...
     @property
     def ranges(self) -> dict[int, int]: ...  # of iterations done: end by begin

@@ -79,7 +79,7 @@ def summary_text(statistics: Statistics) -> str:
         f"{statistics.seconds:.2f} s",
         f"{statistics.eye_samples_per_second / 1e6:.3f} Msamples/s",
         f"{statistics.light_paths_per_second / 1e6:.3f} M light paths/s",
-        f"{statistics.vlps} virtual light points" if statistics.connects else "no virtual light points",
+        f"{statistics.vlps} virtual light points" if statistics.first_connections else "no virtual light points",
         f"{statistics.memory_bytes / 2**20:.0f} MiB",
     ]
     if statistics.noise is not None:

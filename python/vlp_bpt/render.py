@@ -53,11 +53,11 @@ class Progress:
 class Statistics:
     """What a render did and took. eye_samples and light_paths: in all; memory: bytes by device and part; dropped:
     non-finite samples left out; light_rounds: how many times as many light paths were joined to the lens as left
-    virtual light points; connects: eye paths were joined to these (adaptive sampling chooses both, see
-    `RenderSettings`); eye_form: of the eye pass, "paths" or "wavefront" (native/backend/eye_form.h);
-    build_seconds: uploading the scene and building its hierarchy, as far as it changed; denoise_seconds: of denoising
-    the last picture, not part of seconds; noise: of the picture before denoising, as `vlp_bpt.noise` measures it, None
-    without `noise_threshold` and before it was told."""
+    virtual light points; first_connections: how many of these each surface that the camera sees was joined to, 0 where
+    none is joined to any (adaptive sampling chooses both, see `RenderSettings`); eye_form: of the eye pass, "paths" or
+    "wavefront" (native/backend/eye_form.h); build_seconds: uploading the scene and building its hierarchy, as far as it
+    changed; denoise_seconds: of denoising the last picture, not part of seconds; noise: of the picture before
+    denoising, as `vlp_bpt.noise` measures it, None without `noise_threshold` and before it was told."""
 
     iterations: int
     seconds: float
@@ -68,7 +68,7 @@ class Statistics:
     dropped: int
     memory: dict[str, dict[str, int]]
     light_rounds: int = 1
-    connects: bool = True
+    first_connections: int = 1
     eye_form: str = "paths"
     denoise_seconds: float = 0.0
     noise: float | None = None
@@ -193,7 +193,7 @@ class Renderer:
             dropped=int(self._native.dropped),
             memory=self.memory,
             light_rounds=int(self._native.light_rounds),
-            connects=self._native.kappa > 0,
+            first_connections=int(self._native.first_connections),
             eye_form=self._native.eye_form,
             denoise_seconds=self._denoise_seconds,
             noise=self._noise.noise,
@@ -338,7 +338,7 @@ class Renderer:
             "seed": self.settings.seed,
             "eye_form": statistics["eye_form"],
             "light_rounds": statistics["light_rounds"],
-            "connects": statistics["connects"],
+            "first_connections": statistics["first_connections"],
             "film": {"width": self.film.width, "height": self.film.height, "window": list(self.film.render_window)},
             "statistics": {name: statistics[name] for name in ("eye_samples", "light_paths", "dropped")},
         } | ({} if self._noise.noise is None else {"noise": self._noise.noise})

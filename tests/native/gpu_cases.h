@@ -36,7 +36,7 @@ inline std::vector<NamedPass> passes() {
     path_tracing.splats = false;
     PassSettings many = balanced();
     many.light_path_length = many.eye_path_length = k_max_walk;
-    many.vlp_connections = 2, many.vlp_candidates = 3, many.light_samples = 0;
+    many.vlp_connections = 2, many.first_times = 3, many.vlp_candidates = 3, many.light_samples = 0;
     PassSettings rounds = balanced(300);
     rounds.light_rounds = 3;
     PassSettings guided = balanced(), guided_alone = path_tracing;

@@ -68,7 +68,7 @@ inline PassSettings with_kappa(const SceneView& scene, PassSettings pass) {
     ThreadPool pool(1);
     const float per_path =
         pass.light_path_length > 0 && pass.light_paths > 0 ? trace_pilot(scene, pass, pool).vlps_per_path : 0.0f;
-    pass.kappa = per_path > 0 ? static_cast<float>(pass.vlp_connections) / per_path : 0.0f;
+    pass.kappa = pass.vlp_connections > 0 && per_path > 0 ? 1 / per_path : 0.0f;
     return pass;
 }
 

@@ -131,6 +131,7 @@ TEST_P(StrategiesTest, FindTheSameLight) {
     PassSettings pass;
     pass.light_path_length = 3, pass.eye_path_length = 5;
     pass.light_paths = 1500, pass.vlp_connections = 6, pass.light_samples = 2, pass.splats = true;
+    pass.first_times = 2;
     pass = with_kappa(scene.view(), pass);
     PassSettings light_pass = pass;
     light_pass.light_samples = 0;  // so that direct light is splat too

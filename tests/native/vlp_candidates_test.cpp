@@ -62,17 +62,22 @@ TEST(VlpCandidates, ALambertianSurfaceKeepsWhatItPromises) {
     scene.set_camera(looking({0, -3.2f, 1.1f}, {0, 0, 0.8f}, 0.45f));
     scene.set_film(12, 12, {0, 0, 12, 12}, false);
     scene.build(1);
-    const PassSettings pass = with_kappa(scene.view(), many_candidates());
-    size_t pairs = 0;
-    for_each_pair(scene.view(), pass, [&](const EyeWalk&, float promised, const Contribution& found) {
-        // Next event and splats have other counts than connections, and longer paths have fewer strategies than are promised.
-        if (found.s < 3 || found.t < 3 || found.s + found.t > pass.eye_path_length + 1) return;
-        const Rgb weighted = found.value * found.weight;
-        const float light = (weighted.r + weighted.g + weighted.b) * static_cast<float>(pass.light_paths) * k_pi * k_pi;
-        EXPECT_NEAR(promised, light, 0.02f * light + 1e-6f);
-        ++pairs;
-    });
-    EXPECT_GT(pairs, 1000u);
+    for (const uint32_t times : {1u, 4u}) {
+        PassSettings pass = with_kappa(scene.view(), many_candidates());
+        pass.first_times = times;
+        size_t pairs[2]{};
+        for_each_pair(scene.view(), pass, [&](const EyeWalk&, float promised, const Contribution& found) {
+            // Longer paths have fewer strategies than are promised.
+            if (found.s < 3 || found.s + found.t > pass.eye_path_length + 1) return;
+            const Rgb weighted = found.value * found.weight;
+            const float light =
+                (weighted.r + weighted.g + weighted.b) * static_cast<float>(pass.light_paths) * k_pi * k_pi;
+            EXPECT_NEAR(promised, light, 0.02f * light + 1e-6f) << "t " << found.t << ", F " << times;
+            ++pairs[found.t == 2];
+        });
+        EXPECT_GT(pairs[0], 1000u);
+        EXPECT_GT(pairs[1], 1000u);
+    }
 }
 
 TEST(VlpCandidates, WhereThereIsLightItIsPromised) {
@@ -96,7 +101,7 @@ TEST(VlpCandidates, WhereThereIsLightItIsPromised) {
 struct Crowd {
     std::vector<VlpCandidate> list;
     LightVertexCache cache;
-    Receiver receiver{{0, 0, 0}, {0, 0, 1}, 1.0f / 64, {1, 0.5f, 0.25f}, 0.3f};
+    Receiver receiver{{0, 0, 0}, {0, 0, 1}, 1.0f / 64, {1, 0.5f, 0.25f}, 0.3f, 0.7f};
 
     explicit Crowd(uint32_t count) {
         Random random{count};
@@ -139,7 +144,7 @@ TEST(VlpCandidates, LanesComputeTheFormula) {
         const double light = double(detail::first_half(c.red_and_green)) +
                              0.5 * double(detail::second_half(c.red_and_green)) +
                              0.25 * double(detail::first_half(c.blue_and_behind));
-        const double expected = light * geometry / (1 + (0.3 + double(c.others)) * geometry);
+        const double expected = light * geometry / (1 + (0.3 + 0.7 * double(c.others)) * geometry);
         EXPECT_NEAR(promises[i], expected, 2e-4 * expected + 1e-9);
     }
 }
@@ -224,6 +229,52 @@ TEST(VlpCandidates, HandsAreDealtEvenly) {
     EXPECT_EQ(deal(pass, cache, 0x0fffffffu), cache.stored);
     EXPECT_EQ(deal(pass, cache, 0x10000000u), cache.stored + 4);
     EXPECT_EQ(deal(pass, cache, 0xffffffffu), cache.stored + 60);
+}
+
+// Those of a vertex have a part of the hands each, and all sequences are as even as that of one connection.
+TEST(VlpCandidates, ConnectionsShareTheHandsOut) {
+    EXPECT_EQ(draw_of_connection({123, 456}, 0, 1).x, 123u);
+    EXPECT_EQ(draw_of_connection({123, 456}, 0, 1).y, 456u);
+    constexpr uint32_t k_samples = 32;
+    for (const uint32_t count : {2u, 3u, 8u, 1024u}) {
+        std::vector<int> in_part(k_samples * count);
+        std::vector<int> halves(count);
+        for (uint32_t index = 0; index < k_samples; ++index) {
+            for (uint32_t i = 0; i < count; ++i) {
+                const SamplePair u = draw_of_connection(sample_pair(5, reverse_bits(index), 3), i, count);
+                ++in_part[static_cast<size_t>(u.x * 0x1p-32 * k_samples * count)];
+                halves[i] += u.y < 0x80000000u ? 1 : -1;
+            }
+        }
+        // Where `count` does not divide 2^32 rounding may put a number on the wrong side of a bound.
+        const auto filled = std::count(in_part.begin(), in_part.end(), 1);
+        EXPECT_GE(static_cast<size_t>(filled), count == 3 ? in_part.size() - 4 : in_part.size()) << count;
+        for (const int excess : halves) EXPECT_LE(std::abs(excess), 2) << count;
+    }
+    EXPECT_EQ(draw_of_connection({0xffffffffu, 0}, 2, 3).x, 0xffffffffu) << "the last hand can be drawn";
+}
+
+TEST(VlpCandidates, LanesLinePromisesUp) {
+    Random random{3};
+    for (int round = 0; round < 1000; ++round) {
+        float promises[k_candidates_at_once], begins[k_candidates_at_once];
+        for (float& p : promises) p = random.next() < 0.3f ? 0.0f : random.next();
+        promises[round % k_candidates_at_once] = 0.5f;
+        const float sum = line_up(promises, begins);
+        float before = 0;
+        for (uint32_t i = 0; i < k_candidates_at_once; ++i) {
+            EXPECT_NEAR(begins[i], before, 1e-6f);
+            before += promises[i];
+        }
+        EXPECT_NEAR(sum, before, 1e-6f);
+        for (const float at : {0.0f, 0.3f * sum, 0.99f * sum, sum, 2 * sum}) {
+            uint32_t expected = 0;
+            for (uint32_t i = 0; i < k_candidates_at_once; ++i) {
+                if (promises[i] > 0 && begins[i] <= at) expected = i;
+            }
+            EXPECT_EQ(last_begun(promises, begins, at), expected);
+        }
+    }
 }
 
 // Over all hands and evenly spread u_keep every VLP stands for one of itself on average, but for the last draw that it may miss.

@@ -17,6 +17,7 @@ struct Counts {
     uint32_t paths, connections, samples;  // N, C, S
     bool splats = true, hits = true;
     uint32_t rounds = 1;  // R
+    uint32_t first_times = 1;  // F
 };
 constexpr Counts k_counts[] = {{0, 4, 300, 1, 1, false},
                                {1, 1, 300, 1, 2},
@@ -27,7 +28,9 @@ constexpr Counts k_counts[] = {{0, 4, 300, 1, 1, false},
                                {3, 3, 1500, 0, 1},
                                {2, 4, 1500, 1, 0},
                                {2, 4, 300, 2, 1, true, false},
-                               {3, 4, 500, 1, 1, true, true, 3}};
+                               {3, 4, 500, 1, 1, true, true, 3},
+                               {3, 4, 500, 1, 1, true, true, 1, 4},
+                               {3, 5, 500, 2, 1, false, true, 1, 3}};
 
 // Whether rounding leaves the path's densities be: edges are long beside the offsets of ray origins, and no surface is met
 // at so flat an angle that the rounded directions and normals of a light vertex change its cosine much.
@@ -70,7 +73,7 @@ void compare_weights(const SceneView& scene, const PassSettings& pass, uint32_t 
         ASSERT_TRUE(is_finite(c.value) && is_finite(c.weight));
         if (path.light == k_none || c.s + c.t == 2) {  // nothing else makes such a path
             ASSERT_EQ(c.weight, 1);
-            ASSERT_EQ(c.connection_share, 0);
+            ASSERT_EQ(c.shares.all, 0);
             return;
         }
         ASSERT_TRUE(lies_on(scene.lights[path.light], path.x[0].surface.position));
@@ -78,14 +81,16 @@ void compare_weights(const SceneView& scene, const PassSettings& pass, uint32_t 
         ASSERT_LE(c.s, pass.light_path_length + 1);
         ASSERT_LE(c.t, pass.eye_path_length + 1);
         const std::vector<double> w = reference::weights(scene, pass, path);
-        double sum = 0, connections = 0;
+        double sum = 0, connections = 0, first = 0;
         for (size_t s = 0; s < w.size(); ++s) {
             sum += w[s];
             if (s >= 2 && s + 2 <= path.size()) connections += w[s];
+            if (s >= 2 && s + 2 == path.size()) first += w[s];
         }
         ASSERT_NEAR(sum, 1, 1e-6);
-        const double error = std::max(std::fabs(c.weight / w[c.s] - 1),
-                                      std::fabs(static_cast<double>(c.connection_share) - connections));
+        const double error =
+            std::max({std::fabs(c.weight / w[c.s] - 1), std::fabs(static_cast<double>(c.shares.all) - connections),
+                      std::fabs(static_cast<double>(c.shares.first) - first)});
         Errors& of_strategy = (c.t == 1 ? errors.splats : errors.joined)[c.s];
         if (!well_conditioned(path)) {
             of_strategy.rest.push_back(error);
@@ -127,6 +132,7 @@ TEST_P(WeightsTest, EqualTheReference) {
             pass.eye_path_length = counts.eye;
             pass.light_paths = counts.paths;
             pass.light_rounds = counts.rounds;
+            pass.first_times = counts.first_times;
             pass.vlp_connections = counts.connections;
             pass.light_samples = counts.samples;
             pass.splats = counts.splats;

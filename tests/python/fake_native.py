@@ -50,7 +50,7 @@ class FakeRenderer:
         self.notes: list[str] = []
         self.resting = True
         self.eye_form = "paths"
-        self.light_rounds, self.kappa = 1, 0.5
+        self.light_rounds, self.first_connections = 1, 1
 
     @property
     def ranges(self) -> dict[int, int]:

@@ -57,7 +57,7 @@ def test_it_is_the_same_picture_with_less_noise() -> None:
 
 
 def test_the_first_iterations_are_those_without_it() -> None:
-    scene = {"scene": room(24, 24)}  # where a trial chooses what a render without it does
+    scene = {"scene": room(24, 24), "weighting": "POWER"}  # of which there is no trial
     first, without = rendered(4, **scene), rendered(4, adaptive=False, **scene)
     assert np.array_equal(first.film_state(), without.film_state())
     first.iterate(1), without.iterate(1)
@@ -145,16 +145,17 @@ def outdoors() -> Scene:
     )
 
 
-def chosen(scene: Scene, **options: Any) -> tuple[int, bool]:
+def chosen(scene: Scene, **options: Any) -> tuple[int, int]:
     statistics = rendered(1, scene, light_path_length=12, eye_path_length=16, **options).statistics
-    return statistics.light_rounds, statistics.connects
+    return statistics.light_rounds, statistics.first_connections
 
 
 def test_it_chooses_light_paths_and_connections_by_the_scene() -> None:
     assert chosen(glass_on_a_floor(64, 64))[0] > 2, "caustics are made of splats"
     assert not chosen(outdoors())[1]
-    assert chosen(room(64, 64))[1]
-    assert chosen(glass_on_a_floor(64, 64), adaptive=False) == chosen(outdoors(), adaptive=False) == (1, True)
+    assert chosen(room(64, 64))[1] > 1
+    assert chosen(room(64, 64), vlp_connections=3)[1] in (3, 6, 12, 24)
+    assert chosen(glass_on_a_floor(64, 64), adaptive=False) == chosen(outdoors(), adaptive=False) == (1, 1)
 
 
 def test_the_choice_is_told() -> None:
@@ -162,7 +163,7 @@ def test_the_choice_is_told() -> None:
     rounds = renderer.statistics.light_rounds
     assert renderer.statistics.light_paths == 3 * 200 * rounds
     told = renderer.metadata()
-    assert (told["light_rounds"], told["connects"]) == (rounds, renderer.statistics.connects)
+    assert (told["light_rounds"], told["first_connections"]) == (rounds, renderer.statistics.first_connections)
     assert told["settings"]["light_paths"] == 200, "as asked"
     assert rendered(1, outdoors(), light_path_length=12, eye_path_length=16).statistics.vlps == 0
 
@@ -170,6 +171,19 @@ def test_the_choice_is_told() -> None:
 def test_the_same_choice_whatever_seed_and_threads() -> None:
     kinds = {chosen(glass_on_a_floor(64, 64), threads=n, seed=n) for n in (1, 2, 3)}
     assert len(kinds) == 1
+
+
+def test_with_more_connections_it_is_the_same_picture() -> None:
+    options = {"light_paths": 100, "light_path_length": 6, "eye_path_length": 8}
+    assert rendered(1, room(16, 16), **options).statistics.first_connections > 1
+    with_them, without = (
+        np.array(
+            [rendered(16, room(16, 16), seed=s, **options, **kind).read()[..., :3] for s in range(first, first + 200)]
+        )
+        for first, kind in ((0, {}), (1000, {"adaptive": False}))
+    )
+    assert_same_mean(blocks(with_them, 2), blocks(without, 2), "with more connections")
+    assert with_them.var(axis=0).mean() < 0.8 * without.var(axis=0).mean()
 
 
 def test_without_connections_it_is_the_same_picture() -> None:
@@ -183,5 +197,5 @@ def test_without_connections_it_is_the_same_picture() -> None:
         )
         for first, kind in ((0, {}), (1000, {"adaptive": False}))
     )
-    assert not rendered(1, scene, **options).statistics.connects
+    assert not rendered(1, scene, **options).statistics.first_connections
     assert_same_mean(blocks(with_them, 2), blocks(without, 2), "without connections")
