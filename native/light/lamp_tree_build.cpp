@@ -5,10 +5,12 @@
 
 namespace vlp {
 
-namespace {
-
-// As wide as rounding in the tests of ray and shape may ask for.
 Box box_of(const Light& light) {
+    if (light.kind == LightKind::triangle) {
+        Box box;
+        for (const Vec3 corner : {Vec3{}, light.axis_u, light.axis_v}) box.include(light.position + corner);
+        return box;
+    }
     const auto reach = [&](float u, float v) {
         return light.radius + std::fabs(u) * light.half_size.x + std::fabs(v) * light.half_size.y;
     };
@@ -20,6 +22,8 @@ Box box_of(const Light& light) {
     const Vec3 wide = half + Vec3{slack, slack, slack};
     return {light.position - wide, light.position + wide};
 }
+
+namespace {
 
 uint32_t make_leaf(uint32_t begin, uint32_t end) {
     return k_lamp_leaf | (end - begin - 1) << k_lamp_leaf_shift | begin;

@@ -1,8 +1,8 @@
-// Which light a light path starts from, and which one next event asks. Both choose in proportion to power; next event is
-// told the receiver.
+// Which light a light path starts from, in proportion to power, and which one next event asks, by what it may bring.
 #pragma once
 
 #include "geometry/surface.h"
+#include "light/light_tree.h"
 #include "scene/scene_view.h"
 
 namespace vlp {
@@ -14,13 +14,13 @@ VLP_HD inline DiscreteSample choose_source(const SceneView& scene, uint32_t u) {
 
 VLP_HD inline float pdf_choose_source(const SceneView& scene, uint32_t light) { return pdf(scene.light_choice, light); }
 
-// For next event at `receiver`. A choice by what each light brings there, as by a light tree, would change these two alone.
-VLP_HD inline DiscreteSample choose_light(const SceneView& scene, const SurfacePoint& /*receiver*/, uint32_t u) {
-    return choose_source(scene, u);
+// For next event at `receiver`. The scene must have a light.
+VLP_HD inline DiscreteSample choose_light(const SceneView& scene, const SurfacePoint& receiver, uint32_t u) {
+    return sample(scene.light_tree, receiver.position, receiver.geometric_normal, u);
 }
 
-VLP_HD inline float pdf_choose_light(const SceneView& scene, const SurfacePoint& /*receiver*/, uint32_t light) {
-    return pdf_choose_source(scene, light);
+VLP_HD inline float pdf_choose_light(const SceneView& scene, const SurfacePoint& receiver, uint32_t light) {
+    return pdf(scene.light_tree, receiver.position, receiver.geometric_normal, light);
 }
 
 }  // namespace vlp

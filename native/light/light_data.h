@@ -1,6 +1,7 @@
 // Lights as plain data; what they emit and how they are sampled is in light.h.
 #pragma once
 
+#include "core/distribution.h"
 #include "core/rgb.h"
 #include "core/transform.h"
 
@@ -35,6 +36,17 @@ struct EnvironmentView {
     const uint32_t* columns_below = nullptr;  // a Distribution over columns for each row
     uint32_t width = 0, height = 0;
     Vec3 to_image[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};  // rows of the rotation from the world to the picture
+};
+
+struct LightTreeNode;
+
+// How next event chooses, see light_tree.h. Null `nodes`: no light is near.
+struct LightTreeView {
+    const LightTreeNode* nodes = nullptr;
+    const uint32_t* places = nullptr;  // of each light: its leaf, or with k_tree_infinite its number in the list
+    const uint32_t* infinite_lights = nullptr;  // all suns and the environment
+    Distribution infinite;  // over these
+    float infinite_irradiance = 0;
 };
 
 struct LampNode;

@@ -189,6 +189,12 @@ SceneView Scene::view_placed(const Place& place, NodeForm form) const {
     v.light_of_primitive = placed(light_of_primitive_, lights, place);
     v.lights = placed(lights_, lights, place);
     v.light_choice = {placed(light_choice_, lights, place), static_cast<uint32_t>(light_choice_.size())};
+    v.light_tree = {
+        placed(light_tree_.nodes, lights, place),
+        placed(light_tree_.places, lights, place),
+        placed(light_tree_.infinite_lights, lights, place),
+        {placed(light_tree_.infinite_below, lights, place), static_cast<uint32_t>(light_tree_.infinite_below.size())},
+        light_tree_.infinite_irradiance};
     v.infinite_lights = placed(infinite_lights_, lights, place);
     v.infinite_light_count = static_cast<uint32_t>(infinite_lights_.size());
     v.lamps = {placed(lamps_.lights, lights, place), static_cast<uint32_t>(lamps_.lights.size()),
@@ -307,6 +313,7 @@ void Scene::make_light_tables(ThreadPool& pool) {
         (is_infinite(light) ? infinite_lights_ : shapes).push_back(i);
     }
     lamps_ = build_lamp_tree(lights_, std::move(shapes), pool);
+    light_tree_ = build_light_tree(lights_, pool);
 }
 
 }  // namespace vlp

@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "film/film.h"
 #include "light/lamp_tree_build.h"
+#include "light/light_tree_build.h"
 #include "light/light_build.h"
 #include "scene/geometry_build.h"
 #include "scene/material_build.h"
@@ -97,6 +98,7 @@ private:
     std::vector<uint32_t> material_of_slot_, light_of_primitive_, light_choice_, infinite_lights_;
     std::vector<Light> lights_;
     LampTree lamps_;
+    LightTree light_tree_;
     std::vector<GeometryView> geometry_views_;
     Rgb world_;
     std::vector<Rgb> world_texels_;

@@ -69,6 +69,7 @@ struct SceneView {
     const uint32_t* light_of_primitive = nullptr;
     const Light* lights = nullptr;
     Distribution light_choice;    // over lights, by power
+    LightTreeView light_tree;
     uint32_t geometry_count = 0, instance_count = 0, light_count = 0;
     const uint32_t* infinite_lights = nullptr;  // indices of the environment and the suns that are no delta lights
     uint32_t infinite_light_count = 0;

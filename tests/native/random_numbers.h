@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/rng.h"
-#include "core/vec.h"
+#include "core/warp.h"
 
 namespace vlp::test {
 
@@ -10,11 +10,13 @@ namespace vlp::test {
 struct Random {
     uint32_t seed = 0, counter = 0;
 
-    float next() { return static_cast<float>(hash(seed, counter++, 0x51ed270bu) >> 8) * 0x1p-24f; }
+    uint32_t bits() { return hash(seed, counter++, 0x51ed270bu); }
+    float next() { return static_cast<float>(bits() >> 8) * 0x1p-24f; }
     Vec2 next_2d() {
         const float x = next();
         return {x, next()};
     }
+    Vec3 direction() { return sample_sphere(next_2d()); }
 };
 
 }  // namespace vlp::test
