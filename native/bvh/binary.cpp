@@ -59,7 +59,7 @@ struct Cut {
 
 class Builder {
 public:
-    Builder(std::vector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool, BinaryTree& tree)
+    Builder(RawVector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool, BinaryTree& tree)
         : refs_(refs), rule_(rule), max_depth_(max_depth), pool_(pool), tree_(tree) {}
 
     void build() {
@@ -266,7 +266,7 @@ private:
         return centers;
     }
 
-    std::vector<Ref>& refs_;
+    RawVector<Ref>& refs_;
     const LeafRule& rule_;
     uint32_t max_depth_;
     ThreadPool& pool_;
@@ -275,7 +275,7 @@ private:
 
 }  // namespace
 
-BinaryTree build_binary(std::vector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool) {
+BinaryTree build_binary(RawVector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool) {
     BinaryTree tree;
     if (!refs.empty()) Builder(refs, rule, max_depth, pool, tree).build();
     return tree;
