@@ -281,7 +281,7 @@ private:
     ThreadPool& pool_;
     BinaryTree& tree_;
     uint32_t count_;
-    LazyArray<Ref> scratch_;
+    RawVector<Ref> scratch_;
     Ref* buffer_[2];  // where the refs come from and are in the end, and the other one
 };
 
