@@ -1,4 +1,4 @@
-// Binned surface area heuristic: large nodes with all threads on each, then small ones with one thread on each.
+// Binned surface area heuristic: large nodes with all threads on each, then smaller ones with one thread on each.
 #include "bvh/binary.h"
 
 #include <algorithm>
@@ -21,29 +21,40 @@ constexpr uint32_t k_min_parallel = 65536;  // refs in a node that is worth all 
 struct Range {
     uint32_t begin = 0, end = 0;
     uint32_t depth = 0;
-    Bounds box = k_nothing, centers = k_nothing;
+    uint32_t buffer = 0;  // which array they stand in
+    Bounds box, centers;
 
     uint32_t size() const { return end - begin; }
-    void include(const RefBounds& ref) { box.include(ref.low, ref.high), centers.include(ref.center, ref.center); }
+    void include(const RefBounds& ref) { box.include(ref.box()), centers.include({ref.center, ref.center}); }
     void include(const Range& r) { box.include(r.box), centers.include(r.centers); }
 };
 
 // Around the centres of the refs that go to each side, which no branch waits for.
 struct SideCenters {
-    Bounds side[2] = {k_nothing, k_nothing};
+    Bounds left, right;
 
-    void include(Float4 center, uint32_t to) {
-        const Int4 right = Int4{} - static_cast<int32_t>(to), bits = std::bit_cast<Int4>(center);
+    void include(Float4 center, uint32_t side) {
+        const Int4 is_right = Int4{} - static_cast<int32_t>(side), bits = std::bit_cast<Int4>(center);
         // What goes to the other side is not a number, of which neither the least nor the most is taken.
-        const Float4 of_side[2] = {std::bit_cast<Float4>(bits | right), std::bit_cast<Float4>(bits | ~right)};
-        for (uint32_t i : {0u, 1u}) {
-            side[i].low = min4(of_side[i], side[i].low), side[i].high = max4(of_side[i], side[i].high);
-        }
+        const Float4 to_left = std::bit_cast<Float4>(bits | is_right),
+                     to_right = std::bit_cast<Float4>(bits | ~is_right);
+        left.include_numbers({to_left, to_left}), right.include_numbers({to_right, to_right});
     }
-    void include(const SideCenters& other) {
-        for (uint32_t i : {0u, 1u}) side[i].include(other.side[i]);
-    }
+    void include(const SideCenters& other) { left.include(other.left), right.include(other.right); }
 };
+
+// Puts the refs [begin, end) in their order on either side of a split.
+SideCenters partition(const Ref* begin, const Ref* end, SideOf side_of, Ref* to, uint32_t left, uint32_t right) {
+    SideCenters centers;
+    for (const Ref* ref = begin; ref != end; ++ref) {
+        const RefRows rows(*ref);
+        const uint32_t side = side_of(*ref);
+        centers.include(RefBounds(rows).center, side);
+        rows.store(to[left ^ ((left ^ right) & (0 - side))]);  // a choice that is no branch, which would be a guess
+        left += 1 - side, right += side;
+    }
+    return centers;
+}
 
 // A range and where its node's index is to be written.
 struct Job {
@@ -59,36 +70,54 @@ struct Cut {
 
 class Builder {
 public:
-    Builder(std::vector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool, BinaryTree& tree)
-        : refs_(refs), rule_(rule), max_depth_(max_depth), pool_(pool), tree_(tree) {}
+    Builder(RawVector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool, BinaryTree& tree)
+        : rule_(rule),
+          max_depth_(max_depth),
+          pool_(pool),
+          tree_(tree),
+          count_(static_cast<uint32_t>(refs.size())),
+          scratch_(count_),
+          buffer_{refs.data(), scratch_.data()} {}
 
     void build() {
-        const auto count = static_cast<uint32_t>(refs_.size());
-        const Range all = bounds(0, count, true);
+        const Range all = bounds(0, count_, 0, true);
         tree_.box = all.box.box();
-        tree_.nodes = LazyArray<BinaryNode>(count);
-        std::vector<Job> large{{all, &tree_.root}}, small;
-        const uint32_t limit = max_of(k_min_job, count / (k_jobs_per_thread * pool_.size()));
-        LazyArray<Ref> scratch(count < limit ? 0 : count);
+        tree_.nodes = LazyArray<BinaryNode>(count_);
+        std::vector<Job> large{{all, &tree_.root}}, medium, small;
         while (!large.empty()) {
             const Job job = large.back();
             large.pop_back();
-            if (job.range.size() < limit) {
-                small.push_back(job);
-                continue;
+            if (job.range.size() < k_min_parallel) {
+                medium.push_back(job);
+            } else {
+                cut(job, pool_.size() > 1, large);
             }
-            const bool parallel = pool_.size() > 1 && job.range.size() >= k_min_parallel;
-            const Cut cut = split(job.range, parallel, scratch.data());
-            // The subtree that ends where this node is cut needs one place fewer than it has refs.
-            if (!cut.leaf) descend(job, cut, cut.split - 1, large);
         }
-        scratch = {};
+        const uint32_t limit = max_of(k_min_job, count_ / (k_jobs_per_thread * pool_.size()));
+        while (!medium.empty()) {
+            std::vector<std::vector<Job>> sides(medium.size());
+            pool_.run(static_cast<uint32_t>(medium.size()), [&](uint32_t i) {
+                if (medium[i].range.size() >= limit) cut(medium[i], false, sides[i]);
+            });
+            std::vector<Job> next;
+            for (size_t i = 0; i < medium.size(); ++i) {
+                if (medium[i].range.size() < limit) small.push_back(medium[i]);
+                next.insert(next.end(), sides[i].begin(), sides[i].end());
+            }
+            medium = std::move(next);
+        }
         std::stable_sort(small.begin(), small.end(),
                          [](const Job& a, const Job& b) { return a.range.size() > b.range.size(); });
         pool_.run(static_cast<uint32_t>(small.size()), [&](uint32_t i) { build_small(small[i]); });
     }
 
 private:
+    void cut(const Job& job, bool parallel, std::vector<Job>& stack) {
+        const Cut sides = split(job.range, parallel);
+        // The subtree that ends where this node is cut needs one place fewer than it has refs.
+        if (!sides.leaf) descend(job, sides, sides.split - 1, stack);
+    }
+
     // Writes the node of a cut, and puts its sides on the stack, left one on top.
     void descend(const Job& job, const Cut& cut, uint32_t index, std::vector<Job>& stack) {
         BinaryNode& node = tree_.nodes[index];
@@ -101,22 +130,30 @@ private:
     }
 
     void build_small(const Job& first) {
-        LazyArray<Ref> scratch(first.range.size());
         uint32_t next = first.range.begin;
         std::vector<Job> stack{first};
         while (!stack.empty()) {
             const Job job = stack.back();
             stack.pop_back();
-            const Cut cut = split(job.range, false, scratch.data());
+            const Cut cut = split(job.range, false);
             if (!cut.leaf) descend(job, cut, next++, stack);
         }
     }
 
-    // `scratch`: for as many refs as the range has.
-    Cut split(const Range& range, bool parallel, Ref* scratch) {
+    // Takes the refs to the other buffer or leaves them where they are; those of a leaf end in the first one.
+    Cut split(const Range& range, bool parallel) {
+        const Cut cut = cut_of(range, parallel);
+        if (cut.leaf && range.buffer != 0) {
+            std::copy(buffer_[1] + range.begin, buffer_[1] + range.end, buffer_[0] + range.begin);
+        }
+        return cut;
+    }
+
+    Cut cut_of(const Range& range, bool parallel) {
         Cut cut;
         cut.leaf = range.size() == 1 || (is_cheapest_as_block(range.size()) && alike(range));
         if (cut.leaf) return cut;
+        Ref* const refs = buffer_[range.buffer];
         const Binning binning(range.centers, bins_for(range.size()));
         Bins bins(binning.bins);
         std::vector<Bins> of_chunks;
@@ -126,7 +163,7 @@ private:
                 of_chunks = bin_in_parallel(range, binning);
                 for (const Bins& chunk : of_chunks) bins.include(chunk);
             } else {
-                bins.add(refs_.data(), range.begin, range.end, binning);
+                bins.add(refs, range.begin, range.end, binning);
             }
             best = best_split(bins);
         }
@@ -138,15 +175,18 @@ private:
         if (best.axis == k_none) {
             cut.split = range.begin + range.size() / 2;
             halve(range, cut.split);
-            cut.side[0] = bounds(range.begin, cut.split, parallel);
-            cut.side[1] = bounds(cut.split, range.end, parallel);
+            cut.side[0] = bounds(range.begin, cut.split, range.buffer, parallel);
+            cut.side[1] = bounds(cut.split, range.end, range.buffer, parallel);
         } else {
             const SideOf side_of(binning, best);
-            const SideCenters centers = parallel
-                                            ? partition_in_parallel(range, side_of, of_chunks, best, scratch, cut.split)
-                                            : partition(range, side_of, scratch, cut.split);
+            cut.split = range.begin + bins.count_below(best);
+            Ref* const to = buffer_[1 - range.buffer];
+            const SideCenters centers =
+                parallel ? partition_in_parallel(range, side_of, of_chunks, best, cut.split)
+                         : partition(refs + range.begin, refs + range.end, side_of, to, range.begin, cut.split);
             const std::array<Bounds, 2> boxes = boxes_of(bins, best);
-            for (uint32_t i : {0u, 1u}) cut.side[i].box = boxes[i], cut.side[i].centers = centers.side[i];
+            for (uint32_t i : {0u, 1u}) cut.side[i].box = boxes[i], cut.side[i].buffer = 1 - range.buffer;
+            cut.side[0].centers = centers.left, cut.side[1].centers = centers.right;
         }
         cut.side[0].begin = range.begin, cut.side[0].end = cut.side[1].begin = cut.split, cut.side[1].end = range.end;
         cut.side[0].depth = cut.side[1].depth = range.depth + 1;
@@ -160,31 +200,33 @@ private:
 
     // Refs of one leaf are of one kind, and an instance is alone in its leaf.
     bool alike(const Range& range) const {
-        const Ref& first = refs_[range.begin];
+        const Ref* const refs = buffer_[range.buffer];
+        const Ref& first = refs[range.begin];
         if (range.size() == 1) return true;
         for (uint32_t i = range.begin; i < range.end; ++i) {
-            if (refs_[i].primitive == k_none) return false;
+            if (refs[i].primitive == k_none) return false;
             if (rule_.kind_of_instance &&
-                rule_.kind_of_instance[refs_[i].instance] != rule_.kind_of_instance[first.instance]) {
+                rule_.kind_of_instance[refs[i].instance] != rule_.kind_of_instance[first.instance]) {
                 return false;
             }
         }
         return true;
     }
 
-    Range bounds(uint32_t begin, uint32_t end, bool parallel) {
+    Range bounds(uint32_t begin, uint32_t end, uint32_t buffer, bool parallel) {
+        const Ref* const refs = buffer_[buffer];
         Range all;
-        all.begin = begin, all.end = end;
+        all.begin = begin, all.end = end, all.buffer = buffer;
         const uint32_t chunks = chunks_of(all);
         if (!parallel) {
-            for (uint32_t i = begin; i < end; ++i) all.include(RefBounds(refs_[i]));
+            for (uint32_t i = begin; i < end; ++i) all.include(RefBounds(refs[i]));
             return all;
         }
         std::vector<Range> parts(chunks);
         pool_.run(chunks, [&](uint32_t chunk) {
             Range part;
             const uint32_t stop = min_of(end, begin + (chunk + 1) * k_chunk);
-            for (uint32_t i = begin + chunk * k_chunk; i < stop; ++i) part.include(RefBounds(refs_[i]));
+            for (uint32_t i = begin + chunk * k_chunk; i < stop; ++i) part.include(RefBounds(refs[i]));
             parts[chunk] = part;
         });
         for (const Range& part : parts) all.include(part);
@@ -193,29 +235,13 @@ private:
 
     // Puts the lower centres along the longest axis first; equal ones stay as they stand.
     void halve(const Range& range, uint32_t middle) {
-        const Vec3 e = to_vec3(range.centers.high - range.centers.low);
+        const Vec3 e = to_vec3(range.centers.extent());
         const uint32_t axis = e.x >= e.y && e.x >= e.z ? 0 : e.y >= e.z ? 1 : 2;
         if (!((&e.x)[axis] > 0)) return;
         const auto key = [axis](const Ref& r) { return (&r.low.x)[axis] + (&r.high.x)[axis]; };
-        std::nth_element(refs_.begin() + range.begin, refs_.begin() + middle, refs_.begin() + range.end,
+        Ref* const refs = buffer_[range.buffer];
+        std::nth_element(refs + range.begin, refs + middle, refs + range.end,
                          [&](const Ref& a, const Ref& b) { return key(a) < key(b); });
-    }
-
-    // Both partitions keep the order on each side, and tell where the right one begins.
-    SideCenters partition(const Range& range, const SideOf& side_of, Ref* scratch, uint32_t& split) {
-        SideCenters centers;
-        Ref* const refs = refs_.data();
-        uint32_t left = range.begin, right = 0;
-        for (uint32_t i = range.begin; i < range.end; ++i) {
-            const RefRows rows(refs[i]);
-            const uint32_t side = side_of(refs[i]);
-            centers.include(RefBounds(rows).center, side);
-            rows.store(refs[left]), rows.store(scratch[right]);
-            left += 1 - side, right += side;
-        }
-        std::copy_n(scratch, right, refs + left);
-        split = left;
-        return centers;
     }
 
     static uint32_t chunks_of(const Range& range) { return (range.size() + k_chunk - 1) / k_chunk; }
@@ -224,58 +250,44 @@ private:
         std::vector<Bins> parts(chunks_of(range), Bins(binning.bins));
         pool_.run(chunks_of(range), [&](uint32_t chunk) {
             const uint32_t begin = range.begin + chunk * k_chunk;
-            parts[chunk].add(refs_.data(), begin, min_of(range.end, begin + k_chunk), binning);
+            parts[chunk].add(buffer_[range.buffer], begin, min_of(range.end, begin + k_chunk), binning);
         });
         return parts;
     }
 
-    // Every chunk writes its refs to their places in `scratch`, which the bins tell beforehand.
+    // Every chunk writes its refs to their places, which the bins tell beforehand.
     SideCenters partition_in_parallel(const Range& range, const SideOf& side_of, const std::vector<Bins>& bins,
-                                      const Split& best, Ref* scratch, uint32_t& split) {
-        struct Part {
-            uint32_t place[2];
-            SideCenters centers;
-        };
-        std::vector<Part> parts(bins.size());
-        uint32_t left = 0;
-        for (size_t chunk = 0; chunk < bins.size(); ++chunk) {
-            parts[chunk].place[0] = left;
-            left += bins[chunk].count_below(best);
+                                      const Split& best, uint32_t split) {
+        const Ref* const from = buffer_[range.buffer];
+        Ref* const to = buffer_[1 - range.buffer];
+        std::vector<uint32_t> left(bins.size());
+        for (uint32_t chunk = 0, place = range.begin; chunk < left.size(); ++chunk) {
+            left[chunk] = place;
+            place += bins[chunk].count_below(best);
         }
-        for (uint32_t chunk = 0; chunk < parts.size(); ++chunk) {
-            parts[chunk].place[1] = left + chunk * k_chunk - parts[chunk].place[0];
-        }
+        std::vector<SideCenters> parts(bins.size());
         pool_.run(static_cast<uint32_t>(parts.size()), [&](uint32_t chunk) {
-            Part part = parts[chunk];
             const uint32_t begin = range.begin + chunk * k_chunk, end = min_of(range.end, begin + k_chunk);
-            for (uint32_t i = begin; i < end; ++i) {
-                const RefRows rows(refs_[i]);
-                const uint32_t side = side_of(refs_[i]);
-                part.centers.include(RefBounds(rows).center, side);
-                rows.store(scratch[part.place[side]++]);
-            }
-            parts[chunk].centers = part.centers;
-        });
-        pool_.run(static_cast<uint32_t>(parts.size()), [&](uint32_t chunk) {
-            const uint32_t begin = chunk * k_chunk, end = min_of(range.size(), begin + k_chunk);
-            std::copy(scratch + begin, scratch + end, refs_.data() + range.begin + begin);
+            const uint32_t right = split + (begin - left[chunk]);
+            parts[chunk] = partition(from + begin, from + end, side_of, to, left[chunk], right);
         });
         SideCenters centers;
-        for (const Part& part : parts) centers.include(part.centers);
-        split = range.begin + left;
+        for (const SideCenters& part : parts) centers.include(part);
         return centers;
     }
 
-    std::vector<Ref>& refs_;
     const LeafRule& rule_;
     uint32_t max_depth_;
     ThreadPool& pool_;
     BinaryTree& tree_;
+    uint32_t count_;
+    RawVector<Ref> scratch_;
+    Ref* buffer_[2];  // where the refs come from and are in the end, and the other one
 };
 
 }  // namespace
 
-BinaryTree build_binary(std::vector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool) {
+BinaryTree build_binary(RawVector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool) {
     BinaryTree tree;
     if (!refs.empty()) Builder(refs, rule, max_depth, pool, tree).build();
     return tree;

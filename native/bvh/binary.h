@@ -31,6 +31,6 @@ struct LeafRule {
 
 // Sorts the refs so that every node's are neighbours. Below `max_depth` nodes are cut in halves, which bounds the depth.
 // The tree depends on the refs and their order alone, not on the number of threads.
-BinaryTree build_binary(std::vector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool);
+BinaryTree build_binary(RawVector<Ref>& refs, const LeafRule& rule, uint32_t max_depth, ThreadPool& pool);
 
 }  // namespace vlp

@@ -8,6 +8,7 @@
 
 #include "bvh/layout.h"
 #include "bvh/refs.h"
+#include "core/simd.h"
 
 namespace vlp::binning {
 
@@ -21,23 +22,43 @@ using Float4 = float __attribute__((vector_size(16)));
 using Int4 = int32_t __attribute__((vector_size(16)));
 
 inline Float4 min4(Float4 a, Float4 b) { return a < b ? a : b; }
-inline Float4 max4(Float4 a, Float4 b) { return a > b ? a : b; }
 inline Vec3 to_vec3(Float4 v) { return {v[0], v[1], v[2]}; }
 inline Float4 all4(float x) { return Float4{x, x, x, x}; }
 
+// A box: the low sides, and the high ones with the other sign, so that growing is one minimum of all six.
 struct Bounds {
-    Float4 low, high;
+#if VLP_AVX2
+    using Float8 = float __attribute__((vector_size(32)));
 
-    void include(Float4 from, Float4 to) { low = min4(low, from), high = max4(high, to); }
-    void include(const Bounds& b) { include(b.low, b.high); }
-    Box box() const { return {to_vec3(low), to_vec3(high)}; }
+    Float8 sides;
+
+    Bounds(Float4 low, Float4 high) : sides(__builtin_shufflevector(low, -high, 0, 1, 2, 3, 4, 5, 6, 7)) {}
+    void include(const Bounds& b) { sides = sides < b.sides ? sides : b.sides; }
+    void include_numbers(const Bounds& b) { sides = b.sides < sides ? b.sides : sides; }  // leaves NaN out
+    Float4 low() const { return __builtin_shufflevector(sides, sides, 0, 1, 2, 3); }
+    Float4 high() const { return -__builtin_shufflevector(sides, sides, 4, 5, 6, 7); }
+#else
+    Float4 sides[2];
+
+    Bounds(Float4 low, Float4 high) : sides{low, -high} {}
+    void include(const Bounds& b) {
+        for (int i = 0; i < 2; ++i) sides[i] = min4(sides[i], b.sides[i]);
+    }
+    void include_numbers(const Bounds& b) {
+        for (int i = 0; i < 2; ++i) sides[i] = min4(b.sides[i], sides[i]);
+    }
+    Float4 low() const { return sides[0]; }
+    Float4 high() const { return -sides[1]; }
+#endif
+    Bounds() : Bounds(all4(k_infinity), all4(-k_infinity)) {}
+
+    Box box() const { return {to_vec3(low()), to_vec3(high())}; }
+    Float4 extent() const { return high() - low(); }
     float half_area() const {
-        const Float4 e = high - low;
+        const Float4 e = extent();
         return e[0] >= 0 ? e[0] * (e[1] + e[2]) + e[1] * e[2] : 0;
     }
 };
-
-inline constexpr Bounds k_nothing{{k_infinity, k_infinity, k_infinity, 0}, {-k_infinity, -k_infinity, -k_infinity, 0}};
 
 // A ref in two registers.
 struct RefRows {
@@ -45,9 +66,13 @@ struct RefRows {
 
     explicit RefRows(const Ref& ref) {
         static_assert(sizeof(Ref) == sizeof(RefRows));
-        std::memcpy(this, &ref, sizeof ref);
+        std::memcpy(&low, &ref.low, sizeof low);  // one at a time, else they go by way of the stack
+        std::memcpy(&high, &ref.high, sizeof high);
     }
-    void store(Ref& ref) const { std::memcpy(static_cast<void*>(&ref), this, sizeof ref); }
+    void store(Ref& ref) const {
+        std::memcpy(static_cast<void*>(&ref.low), &low, sizeof low);
+        std::memcpy(static_cast<void*>(&ref.high), &high, sizeof high);
+    }
 };
 
 // A ref's corners and twice its centre.
@@ -60,6 +85,7 @@ struct RefBounds {
         center = low + high;
     }
     explicit RefBounds(const Ref& ref) : RefBounds(RefRows(ref)) {}
+    Bounds box() const { return {low, high}; }
 };
 
 // Which bin a centre falls into, along each axis. An axis along which nothing can be split has all in bin 0.
@@ -68,9 +94,9 @@ struct Binning {
     uint32_t bins;
 
     Binning(const Bounds& centers, uint32_t bin_count)
-        : low(centers.low), scale{0, 0, 0, 0}, last(all4(static_cast<float>(bin_count - 1))), bins(bin_count) {
+        : low(centers.low()), scale{0, 0, 0, 0}, last(all4(static_cast<float>(bin_count - 1))), bins(bin_count) {
         for (int a = 0; a < 3; ++a) {
-            const float extent = centers.high[a] - centers.low[a];
+            const float extent = centers.extent()[a];
             const float s = extent > 0 ? static_cast<float>(bins) * (1 - 0x1p-20f) / extent : 0.0f;
             scale[a] = s < k_infinity ? s : 0.0f;
         }
@@ -94,17 +120,16 @@ struct Bins {
     std::array<Bin, k_max_bins> bin;
     uint32_t count;
 
-    explicit Bins(uint32_t bins) : count(bins) {
-        std::fill_n(bin.begin(), count, Bin{{k_nothing, k_nothing, k_nothing}, {0, 0, 0, 0}});
-    }
+    explicit Bins(uint32_t bins) : count(bins) { std::fill_n(bin.begin(), count, Bin{{}, {0, 0, 0, 0}}); }
 
     void add(const Ref* refs, uint32_t begin, uint32_t end, const Binning& binning) {
         for (uint32_t i = begin; i < end; ++i) {
             const RefBounds ref(refs[i]);
+            const Bounds box = ref.box();
             const Int4 index = binning.bins_of(ref.center);
             for (int axis = 0; axis < 3; ++axis) {
                 Bin& b = bin[static_cast<uint32_t>(index[axis])];
-                b.box[axis].include(ref.low, ref.high);
+                b.box[axis].include(box);
                 ++reinterpret_cast<int32_t*>(&b.count)[axis];
             }
         }
@@ -144,7 +169,7 @@ private:
 
 // The boxes of three axes and how many refs they have, which grow bin by bin.
 struct Side {
-    Bounds box[3] = {k_nothing, k_nothing, k_nothing};
+    Bounds box[3];
     Int4 count{0, 0, 0, 0};
 
     void include(const Bin& bin) {
@@ -153,7 +178,7 @@ struct Side {
     }
     // Half area times blocks of each axis; not a number where there is no ref.
     Float4 cost() const {
-        const Float4 a = box[0].high - box[0].low, b = box[1].high - box[1].low, c = box[2].high - box[2].low;
+        const Float4 a = box[0].extent(), b = box[1].extent(), c = box[2].extent();
         const Float4 x{a[0], b[0], c[0], 0}, y{a[1], b[1], c[1], 0}, z{a[2], b[2], c[2], 0};
         static_assert(k_block_width == 4);
         return (x * (y + z) + y * z) * __builtin_convertvector((count + 3) >> 2, Float4);
@@ -186,7 +211,7 @@ inline Split best_split(const Bins& bins) {
 
 // The boxes of both sides.
 inline std::array<Bounds, 2> boxes_of(const Bins& bins, const Split& split) {
-    std::array<Bounds, 2> sides{k_nothing, k_nothing};
+    std::array<Bounds, 2> sides;
     for (uint32_t i = 0; i < bins.count; ++i) {
         sides[static_cast<int32_t>(i) < split.bin ? 0 : 1].include(bins.bin[i].box[split.axis]);
     }

@@ -16,7 +16,7 @@ constexpr uint32_t k_always_flatten = 4096;  // primitives of all placements tog
 constexpr uint32_t k_small_geometry = 16384;  // primitives; such trees are built side by side, one thread each
 constexpr uint32_t k_tree_stack = k_stack_size / 2 - 1;  // the other half is for the tree of an instance
 
-WideTree build_tree(std::vector<Ref>& refs, const LeafSource& source, const uint8_t* kinds, ThreadPool& pool) {
+WideTree build_tree(RawVector<Ref>& refs, const LeafSource& source, const uint8_t* kinds, ThreadPool& pool) {
     if (refs.size() >= 1u << k_child_index_bits) throw std::length_error("Too many primitives for one scene");
     presplit(refs, source, pool);
     const LeafRule rule{k_block_width, k_block_cost, kinds};  // the plan makes larger leaves where they pay
@@ -80,8 +80,9 @@ std::vector<uint8_t> choose_flattened(std::span<const GeometryView> geometries,
 
 WideTree build_geometry_tree(std::span<const GeometryView> geometries, std::span<const InstanceView> instances,
                              size_t geometry, ThreadPool& pool) {
-    std::vector<Ref> refs;
-    append_refs(geometries[geometry], nullptr, k_none, pool, refs);
+    RawVector<Ref> refs(geometries[geometry].primitive_count);
+    const RefRun run{&geometries[geometry], nullptr, k_none, 0};
+    write_refs({&run, 1}, pool, refs);
     return build_tree(refs, {geometries, instances, &geometries[geometry]}, nullptr, pool);
 }
 
@@ -91,20 +92,25 @@ WideTree build_world_tree(std::span<const GeometryView> geometries, std::span<co
     for (size_t i = 0; i < instances.size(); ++i) {
         count += flattened[i] ? geometries[instances[i].geometry].primitive_count : 1;
     }
-    std::vector<Ref> refs;
+    if (count >= 1u << k_child_index_bits) throw std::length_error("Too many primitives for one scene");
+    RawVector<Ref> refs;
     refs.reserve(count + k_free_splits + count / k_refs_per_split);
+    std::vector<RefRun> runs;
     std::vector<uint8_t> kinds(instances.size());
     for (size_t i = 0; i < instances.size(); ++i) {
+        const auto index = static_cast<uint32_t>(i), first = static_cast<uint32_t>(refs.size());
         const InstanceView& instance = instances[i];
         const GeometryView& geometry = geometries[instance.geometry];
         kinds[i] = static_cast<uint8_t>(geometry.kind);
         if (flattened[i]) {
-            append_refs(geometry, &instance, static_cast<uint32_t>(i), pool, refs);
+            runs.push_back({&geometry, &instance, index, first});
+            refs.resize(first + geometry.primitive_count);
         } else if (roots[instance.geometry]) {
             const Box box = instance_box(*roots[instance.geometry], instance.object_to_world);
-            refs.push_back({box.low, static_cast<uint32_t>(i), box.high, k_none});
+            refs.push_back({box.low, index, box.high, k_none});
         }
     }
+    write_refs(runs, pool, refs);
     return build_tree(refs, {geometries, instances, nullptr}, kinds.data(), pool);
 }
 

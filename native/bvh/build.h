@@ -6,20 +6,17 @@
 #include <vector>
 
 #include "bvh/layout.h"
+#include "bvh/tree_span.h"
 #include "core/parallel.h"
+#include "core/raw_vector.h"
 #include "scene/scene_view.h"
 
 namespace vlp {
 
-// Where a tree's part of each array begins.
-struct TreeSpan {
-    uint32_t node = 0, triangle_block = 0, sphere_block = 0;
-};
-
 struct Bvh {
-    std::vector<BvhNode> nodes;  // each before its children
-    std::vector<TriangleBlock> triangle_blocks;
-    std::vector<SphereBlock> sphere_blocks;
+    RawVector<BvhNode> nodes;  // each before its children
+    RawVector<TriangleBlock> triangle_blocks;
+    RawVector<SphereBlock> sphere_blocks;
     std::vector<uint32_t> instance_roots;
     uint32_t root = k_none;
     Vec3 low, high;  // bounds of every surface in world space; both 0 in an empty scene

@@ -1,4 +1,4 @@
-// Writes wide nodes from the root down; subtrees are done in parallel and put one behind the other.
+// Writes wide nodes from the root down; subtrees are done in parallel, each in a place of its own that is counted before.
 #include "bvh/collapse.h"
 
 #include <memory>
@@ -11,7 +11,6 @@ namespace vlp {
 namespace {
 
 constexpr uint32_t k_min_job = 2048;  // refs in a subtree that is worth a thread
-constexpr uint32_t k_batch = 16;  // jobs of a thread before what they wrote is put into the tree, which takes memory
 
 // Opens the child with the most refs until a node is full, which bounds the depth.
 WideChildren balanced_children(const BinaryTree& tree, const Subtree& subtree) {
@@ -37,20 +36,6 @@ struct Job {
     uint32_t parent, slot;
 };
 
-// Of a wide tree or of a part of it.
-struct Size {
-    size_t nodes = 0;
-    size_t blocks[2] = {0, 0};  // by GeometryKind
-
-    void add(const Size& s) { nodes += s.nodes, blocks[0] += s.blocks[0], blocks[1] += s.blocks[1]; }
-};
-
-void reserve(WideTree& tree, const Size& size) {
-    tree.nodes.reserve(size.nodes);
-    tree.triangle_blocks.reserve(size.blocks[static_cast<size_t>(GeometryKind::mesh)]);
-    tree.sphere_blocks.reserve(size.blocks[static_cast<size_t>(GeometryKind::spheres)]);
-}
-
 class Collapser {
 public:
     // `plan`: null for a balanced tree.
@@ -58,45 +43,46 @@ public:
               uint32_t job_size, WideTree& out)
         : tree_(tree), refs_(refs), source_(source), plan_(plan), job_size_(job_size), out_(out) {}
 
-    // Writes the subtree and returns its root, the stack that it needs and its depth.
+    // Writes the subtree at `place`, which moves behind it, and returns its root, the stack that it needs and its depth.
     struct Written {
-        uint32_t node, stack_need, depth;
+        uint32_t node = 0, stack_need = 0, depth = 0;
     };
-    Written write(const Subtree& subtree) {
-        const WideChildren children = plan_ ? plan_->children_of(subtree) : balanced_children(tree_, subtree);
-        const auto index = static_cast<uint32_t>(out_.nodes.size());
-        out_.nodes.emplace_back();
+    Written write(const Subtree& subtree, TreeSpan& place) {
+        const WideChildren children = children_of(subtree);
+        const uint32_t index = place.node++;
+        BvhNode& node = out_.nodes[index];
         uint32_t stack_need = 1, depth_below = 0;
         for (uint32_t i = 0; i < k_node_width; ++i) {
             const bool there = i < children.count;
             const Subtree& to = children.child[i];
-            set_child_box(out_.nodes[index], i, there ? widened(to.box) : Box{});
+            set_child_box(node, i, there ? widened(to.box) : Box{});
             uint32_t child = k_none;
             if (there && to.is_leaf()) {
-                child = pack_leaf(refs_.subspan(to.begin, to.size()), source_, out_);
+                child = pack_leaf(refs_.subspan(to.begin, to.size()), source_, out_, place);
             } else if (there && to.size() < job_size_) {
                 jobs.push_back({to, index, i});
             } else if (there) {
-                const Written written = write(to);
+                const Written written = write(to, place);
                 child = make_child(ChildKind::node, written.node);
                 stack_need = max_of(stack_need, written.stack_need);
                 depth_below = max_of(depth_below, written.depth);
             }
-            out_.nodes[index].child[i] = child;
+            node.child[i] = child;
         }
         return {index, stack_need + children.count - 1, depth_below + 1};
     }
 
-    // What `write` would append, of jobs nothing.
-    Size size_of(const Subtree& subtree) const {
-        const WideChildren children = plan_ ? plan_->children_of(subtree) : balanced_children(tree_, subtree);
-        Size size{1, {0, 0}};
+    // What `write` takes, of jobs nothing.
+    TreeSpan size_of(const Subtree& subtree) const {
+        const WideChildren children = children_of(subtree);
+        TreeSpan size{1, 0, 0};
         for (uint32_t i = 0; i < children.count; ++i) {
             const Subtree& to = children.child[i];
             if (to.is_leaf()) {
                 const Ref& first = refs_[to.begin];
                 if (first.primitive == k_none) continue;
-                size.blocks[static_cast<size_t>(source_.geometry_of(first).kind)] += blocks_for(to.size());
+                const bool mesh = source_.geometry_of(first).kind == GeometryKind::mesh;
+                (mesh ? size.triangle_block : size.sphere_block) += blocks_for(to.size());
             } else if (to.size() >= job_size_) {
                 size.add(size_of(to));
             }
@@ -107,6 +93,10 @@ public:
     std::vector<Job> jobs;
 
 private:
+    WideChildren children_of(const Subtree& subtree) const {
+        return plan_ ? plan_->children_of(subtree) : balanced_children(tree_, subtree);
+    }
+
     const BinaryTree& tree_;
     std::span<const Ref> refs_;
     const LeafSource& source_;
@@ -114,6 +104,12 @@ private:
     uint32_t job_size_;  // smaller subtrees become jobs; 0: none does
     WideTree& out_;
 };
+
+void resize(WideTree& tree, const TreeSpan& size) {
+    tree.nodes.resize(size.node);
+    tree.triangle_blocks.resize(size.triangle_block);
+    tree.sphere_blocks.resize(size.sphere_block);
+}
 
 }  // namespace
 
@@ -139,36 +135,34 @@ WideTree collapse(const BinaryTree& tree, std::span<const Ref> refs, const LeafS
     const auto count = static_cast<uint32_t>(refs.size());
     const uint32_t job_size = count < 2 * k_min_job ? 0 : max_of(k_min_job, count / 256);
     const auto plan = rule ? std::make_unique<Plan>(tree, refs, *rule, pool) : nullptr;
+    const Subtree root{tree.box, tree.root, 0, count};
     Collapser top(tree, refs, source, plan.get(), job_size, whole);
-    const auto top_part = top.write({tree.box, tree.root, 0, count});
-    const auto job_count = static_cast<uint32_t>(top.jobs.size());
-    std::vector<Size> sizes(job_count);
-    pool.run(job_count, [&](uint32_t i) {
-        sizes[i] = Collapser(tree, refs, source, plan.get(), 0, whole).size_of(top.jobs[i].subtree);
-    });
-    Size size{whole.nodes.size(), {whole.triangle_blocks.size(), whole.sphere_blocks.size()}};
-    for (const Size& part : sizes) size.add(part);
-    reserve(whole, size);
-    uint32_t stack_need = 0, depth = 0;
-    std::vector<WideTree> parts;
-    for (uint32_t begin = 0; begin < job_count; begin += static_cast<uint32_t>(parts.size())) {
-        parts = std::vector<WideTree>(min_of(k_batch * pool.size(), job_count - begin));
-        pool.run(static_cast<uint32_t>(parts.size()), [&](uint32_t i) {
-            reserve(parts[i], sizes[begin + i]);
-            Collapser part(tree, refs, source, plan.get(), 0, parts[i]);
-            const auto written = part.write(top.jobs[begin + i].subtree);
-            parts[i].stack_need = written.stack_need, parts[i].depth = written.depth;
-        });
-        for (uint32_t i = 0; i < parts.size(); ++i) {
-            const Job& job = top.jobs[begin + i];
-            const uint32_t root = append(whole, parts[i]);
-            whole.nodes[job.parent].child[job.slot] = make_child(ChildKind::node, root);
-            stack_need = max_of(stack_need, parts[i].stack_need);
-            depth = max_of(depth, parts[i].depth);
-        }
+    TreeSpan place, size = top.size_of(root);
+    resize(whole, size);
+    const auto top_part = top.write(root, place);
+    const std::vector<Job>& jobs = top.jobs;
+    const auto job_count = static_cast<uint32_t>(jobs.size());
+    Collapser below(tree, refs, source, plan.get(), 0, whole);
+    std::vector<TreeSpan> places(job_count);
+    pool.run(job_count, [&](uint32_t i) { places[i] = below.size_of(jobs[i].subtree); });
+    for (TreeSpan& job : places) {
+        const TreeSpan begin = size;
+        size.add(job);
+        job = begin;
     }
-    whole.stack_need = top_part.stack_need + stack_need;
-    whole.depth = top_part.depth + depth;
+    resize(whole, size);
+    std::vector<Collapser::Written> parts(job_count);
+    pool.run(job_count, [&](uint32_t i) {
+        parts[i] = below.write(jobs[i].subtree, places[i]);
+        whole.nodes[jobs[i].parent].child[jobs[i].slot] = make_child(ChildKind::node, parts[i].node);
+    });
+    Collapser::Written deepest;
+    for (const auto& part : parts) {
+        deepest.stack_need = max_of(deepest.stack_need, part.stack_need),
+        deepest.depth = max_of(deepest.depth, part.depth);
+    }
+    whole.stack_need = top_part.stack_need + deepest.stack_need;
+    whole.depth = top_part.depth + deepest.depth;
     return whole;
 }
 

@@ -2,13 +2,14 @@
 #pragma once
 
 #include "bvh/plan.h"
+#include "bvh/tree_span.h"
 
 namespace vlp {
 
 struct WideTree {
-    std::vector<BvhNode> nodes;  // the root is the first; empty: no refs
-    std::vector<TriangleBlock> triangle_blocks;
-    std::vector<SphereBlock> sphere_blocks;
+    RawVector<BvhNode> nodes;  // the root is the first; empty: no refs
+    RawVector<TriangleBlock> triangle_blocks;
+    RawVector<SphereBlock> sphere_blocks;
     Box box;
     uint32_t stack_need = 0;  // entries of the traversal's stack in the worst case
     uint32_t depth = 0;       // nodes on the longest way from the root

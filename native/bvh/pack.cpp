@@ -36,13 +36,13 @@ Sphere in_lane(const SphereBlock& block, uint32_t lane) {
     return {{block.center[0][lane], block.center[1][lane], block.center[2][lane]}, block.radius[lane]};
 }
 
-uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree& out) {
+uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree& out, TreeSpan& place) {
     const Ref& first = refs.front();
     if (first.primitive == k_none) return make_child(ChildKind::instance, first.instance);
     const uint32_t blocks = blocks_for(static_cast<uint32_t>(refs.size()));
     if (source.geometry_of(first).kind == GeometryKind::mesh) {
-        const auto index = static_cast<uint32_t>(out.triangle_blocks.size());
-        out.triangle_blocks.resize(index + blocks);
+        const uint32_t index = place.triangle_block;
+        place.triangle_block += blocks;
         for (uint32_t i = 0; i < blocks * k_block_width; ++i) {
             TriangleBlock& block = out.triangle_blocks[index + i / k_block_width];
             const Corners none{{{k_nan, k_nan, k_nan}, {k_nan, k_nan, k_nan}, {k_nan, k_nan, k_nan}}};
@@ -55,8 +55,8 @@ uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree
         }
         return make_child(ChildKind::triangles, index, blocks);
     }
-    const auto index = static_cast<uint32_t>(out.sphere_blocks.size());
-    out.sphere_blocks.resize(index + blocks);
+    const uint32_t index = place.sphere_block;
+    place.sphere_block += blocks;
     for (uint32_t i = 0; i < blocks * k_block_width; ++i) {
         SphereBlock& block = out.sphere_blocks[index + i / k_block_width];
         if (i >= refs.size()) {

@@ -11,7 +11,8 @@ void set_lane(SphereBlock& block, uint32_t lane, const Sphere& sphere, const Ref
 Corners in_lane(const TriangleBlock& block, uint32_t lane);
 Sphere in_lane(const SphereBlock& block, uint32_t lane);
 
-// All `refs` are of one kind, or one instance. Appends blocks to `out` and returns the child that points to them.
-uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree& out);
+// All `refs` are of one kind, or one instance. Writes blocks to `out` at `place`, which moves behind them, and returns the
+// child that points to them.
+uint32_t pack_leaf(std::span<const Ref> refs, const LeafSource& source, WideTree& out, TreeSpan& place);
 
 }  // namespace vlp

@@ -89,7 +89,7 @@ float waste_of(const Corners& c, const Box& box) {
 class Splitter {
 public:
     // `scene`: around all refs.
-    Splitter(std::vector<Ref>& refs, const Box& scene, const LeafSource& source, ThreadPool& pool)
+    Splitter(RawVector<Ref>& refs, const Box& scene, const LeafSource& source, ThreadPool& pool)
         : refs_(refs),
           source_(source),
           pool_(pool),
@@ -99,11 +99,11 @@ public:
 
     void split() {
         if (!halving_.is_possible()) return;
-        std::vector<float> priority(size());
+        RawVector<float> priority(size());
         for_chunks([&](uint32_t, uint32_t i) { priority[i] = priority_of(refs_[i]); });
         const float factor = factor_for(priority);
         if (factor == 0) return;
-        std::vector<std::vector<Ref>> added(chunks_);
+        std::vector<RawVector<Ref>> added(chunks_);
         for_chunks([&](uint32_t chunk, uint32_t i) {
             const uint32_t splits = splits_of(priority[i], factor);
             if (splits > 0) split(refs_[i], splits, source_.corners_of(refs_[i]), added[chunk]);
@@ -138,7 +138,7 @@ private:
     }
 
     // The largest factor by which the splits stay within the budget; 0: none.
-    float factor_for(const std::vector<float>& priority) {
+    float factor_for(const RawVector<float>& priority) {
         const float most = *std::max_element(priority.begin(), priority.end());
         if (!(most > 0)) return 0;
         const auto budget = k_free_splits + size() / k_refs_per_split;
@@ -160,7 +160,7 @@ private:
     }
 
     // Leaves the first part in `ref` and adds the others.
-    void split(Ref& ref, uint32_t splits, const Corners& triangle, std::vector<Ref>& added) const {
+    void split(Ref& ref, uint32_t splits, const Corners& triangle, RawVector<Ref>& added) const {
         const Plane plane = splits > 0 ? halving_.plane_of(ref.box()) : Plane{};
         if (plane.axis == k_none) return;
         Box part[2];
@@ -186,7 +186,7 @@ private:
         return max_of(max_of(e.x, e.y), e.z);
     }
 
-    std::vector<Ref>& refs_;
+    RawVector<Ref>& refs_;
     const LeafSource& source_;
     ThreadPool& pool_;
     uint32_t chunks_;
@@ -196,9 +196,17 @@ private:
 
 }  // namespace
 
-void presplit(std::vector<Ref>& refs, const LeafSource& source, ThreadPool& pool) {
+void presplit(RawVector<Ref>& refs, const LeafSource& source, ThreadPool& pool) {
+    const auto count = static_cast<uint32_t>(refs.size());
+    std::vector<Box> boxes((count + k_chunk - 1) / k_chunk);
+    pool.run(static_cast<uint32_t>(boxes.size()), [&](uint32_t chunk) {
+        Box box;
+        const uint32_t end = min_of(count, (chunk + 1) * k_chunk);
+        for (uint32_t i = chunk * k_chunk; i < end; ++i) box.include(refs[i].box());
+        boxes[chunk] = box;
+    });
     Box scene;
-    for (const Ref& ref : refs) scene.include(ref.box());
+    for (const Box& box : boxes) scene.include(box);
     if (!refs.empty()) Splitter(refs, scene, source, pool).split();
 }
 

@@ -10,6 +10,6 @@ inline constexpr uint32_t k_free_splits = 65536, k_refs_per_split = 24;
 
 // Adds refs of parts of triangles, within the budget, and narrows the first part's ref. The result depends on the refs
 // alone, not on the number of threads (after Karras & Aila 2013).
-void presplit(std::vector<Ref>& refs, const LeafSource& source, ThreadPool& pool);
+void presplit(RawVector<Ref>& refs, const LeafSource& source, ThreadPool& pool);
 
 }  // namespace vlp

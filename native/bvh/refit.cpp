@@ -64,7 +64,7 @@ public:
 
 private:
     template <typename Block>
-    void refit_leaf(std::vector<Block>& all, BvhNode& node, uint32_t i, Contents& contents) {
+    void refit_leaf(RawVector<Block>& all, BvhNode& node, uint32_t i, Contents& contents) {
         const uint32_t first = child_index(node.child[i]);
         const std::span<Block> blocks(all.data() + first, child_blocks(node.child[i]));
         const bool moves = has_moved(blocks);

@@ -56,18 +56,25 @@ bool can_flatten(const GeometryView& geometry, const InstanceView& placement) {
     return true;
 }
 
-void append_refs(const GeometryView& geometry, const InstanceView* placement, uint32_t instance, ThreadPool& pool,
-                 std::vector<Ref>& refs) {
-    const size_t first = refs.size();
-    refs.resize(first + geometry.primitive_count);
-    Ref* const out = refs.data() + first;
-    const uint32_t chunks = (geometry.primitive_count + k_chunk - 1) / k_chunk;
-    pool.run(chunks, [&](uint32_t chunk) {
-        const uint32_t end = min_of(geometry.primitive_count, (chunk + 1) * k_chunk);
-        for (uint32_t i = chunk * k_chunk; i < end; ++i) {
-            const Box box = geometry.kind == GeometryKind::mesh ? box_of(corners_of(geometry, placement, i))
-                                                                : box_of(sphere_of(geometry, placement, i));
-            out[i] = {box.low, instance, box.high, i};
+void write_refs(std::span<const RefRun> runs, ThreadPool& pool, std::span<Ref> refs) {
+    struct Chunk {
+        const RefRun* run;
+        uint32_t begin, end;
+    };
+    std::vector<Chunk> chunks;
+    for (const RefRun& run : runs) {
+        const uint32_t count = run.geometry->primitive_count;
+        for (uint32_t begin = 0; begin < count; begin += k_chunk) {
+            chunks.push_back({&run, begin, min_of(count, begin + k_chunk)});
+        }
+    }
+    pool.run(static_cast<uint32_t>(chunks.size()), [&](uint32_t chunk) {
+        const auto [run, begin, end] = chunks[chunk];
+        const GeometryView& geometry = *run->geometry;
+        for (uint32_t i = begin; i < end; ++i) {
+            const Box box = geometry.kind == GeometryKind::mesh ? box_of(corners_of(geometry, run->placement, i))
+                                                                : box_of(sphere_of(geometry, run->placement, i));
+            refs[run->first + i] = {box.low, run->instance, box.high, i};
         }
     });
 }

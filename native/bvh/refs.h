@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "core/raw_vector.h"
 #include "scene/scene_view.h"
 
 namespace vlp {
@@ -46,9 +47,16 @@ Box box_of(const Sphere& sphere);
 // Whether the instance's primitives can stand in the world's tree: spheres must stay spheres.
 bool can_flatten(const GeometryView& geometry, const InstanceView& placement);
 
-// Writes the refs of every primitive; `instance` is k_none for a tree of the geometry's own.
-void append_refs(const GeometryView& geometry, const InstanceView* placement, uint32_t instance, ThreadPool& pool,
-                 std::vector<Ref>& refs);
+// The primitives of a geometry, whose refs stand one behind the other.
+struct RefRun {
+    const GeometryView* geometry;
+    const InstanceView* placement;  // null: in the space of the object
+    uint32_t instance;              // k_none for a tree of the geometry's own
+    uint32_t first;                 // where its refs begin
+};
+
+// Writes the refs of every primitive.
+void write_refs(std::span<const RefRun> runs, ThreadPool& pool, std::span<Ref> refs);
 
 // Bounds of a box after an affine map.
 Box transform_box(const Affine& map, const Box& box);

@@ -12,7 +12,7 @@ namespace {
 
 // Puts `part` where `whole` has [begin, end).
 template <typename T>
-void replace(std::vector<T>& whole, size_t begin, size_t end, const std::vector<T>& part) {
+void replace(RawVector<T>& whole, size_t begin, size_t end, const RawVector<T>& part) {
     const size_t common = min_of(part.size(), end - begin);
     const auto at = [&](size_t i) { return static_cast<std::ptrdiff_t>(i); };
     std::copy_n(part.begin(), common, whole.begin() + at(begin));
@@ -44,10 +44,7 @@ void replace_tree(Bvh& bvh, size_t which, const WideTree& tree) {
     const std::span<BvhNode> nodes(bvh.nodes);
     shift_children(nodes.subspan(begin.node, tree.nodes.size()), begin);
     shift_children(nodes.subspan(moved_end.node), by);
-    for (size_t t = which + 1; t < bvh.trees.size(); ++t) {
-        TreeSpan& later = bvh.trees[t];
-        later.node += by.node, later.triangle_block += by.triangle_block, later.sphere_block += by.sphere_block;
-    }
+    for (size_t t = which + 1; t < bvh.trees.size(); ++t) bvh.trees[t].add(by);
     for (uint32_t& root : bvh.instance_roots) {
         if (root != k_none && root >= end.node) root += by.node;
     }

@@ -37,7 +37,7 @@ LampTree build_lamp_tree(const std::vector<Light>& lights, std::vector<uint32_t>
         result.lights = std::move(shapes);
         return result;
     }
-    std::vector<Ref> refs;
+    RawVector<Ref> refs;
     for (const uint32_t index : shapes) {
         const Box box = box_of(lights[index]);
         refs.push_back({box.low, k_none, box.high, index});

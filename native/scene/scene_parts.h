@@ -38,8 +38,8 @@ using Place = std::function<const void*(ScenePart part, const void* data, size_t
 inline const void* in_place(ScenePart, const void* data, size_t) { return data; }
 
 // Null when the vector is empty.
-template <typename T>
-const T* placed(const std::vector<T>& v, ScenePart part, const Place& place) {
+template <typename T, typename Allocator>
+const T* placed(const std::vector<T, Allocator>& v, ScenePart part, const Place& place) {
     return v.empty() ? nullptr : static_cast<const T*>(place(part, v.data(), v.size() * sizeof(T)));
 }
 

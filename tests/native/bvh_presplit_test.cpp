@@ -24,14 +24,16 @@ Mesh make_boards(uint32_t count, float scale = 1) {
 
 struct Split {
     RayScene scene;
-    std::vector<Ref> before, after;
+    RawVector<Ref> before, after;
 };
 
 Split split(const Mesh& mesh, unsigned threads = 1) {
     Split result;
     result.scene.place(result.scene.add(mesh));
     ThreadPool pool(threads);
-    append_refs(result.scene.geometries[0], &result.scene.instances[0], 0, pool, result.before);
+    result.before.resize(mesh.triangles.size());
+    const RefRun run{&result.scene.geometries[0], &result.scene.instances[0], 0, 0};
+    write_refs({&run, 1}, pool, result.before);
     result.after = result.before;
     presplit(result.after, {result.scene.geometries, result.scene.instances, nullptr}, pool);
     return result;
@@ -42,7 +44,7 @@ bool contains(const Box& box, Vec3 p) {
            p.z <= box.high.z;
 }
 
-double area_of(const std::vector<Ref>& refs) {
+double area_of(const RawVector<Ref>& refs) {
     double area = 0;
     for (const Ref& ref : refs) area += static_cast<double>(ref.box().half_area());
     return area;

@@ -32,13 +32,13 @@ Bvh build_anew(const RayScene& scene) {
     return build_bvh(scene.geometries, scene.instances, pool);
 }
 
-template <typename T>
-bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
+template <typename T, typename Allocator>
+bool same_bits(const std::vector<T, Allocator>& a, const std::vector<T, Allocator>& b) {
     return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
 }
 
 // But for the padding behind children.
-bool same_bits(const std::vector<BvhNode>& a, const std::vector<BvhNode>& b) {
+bool same_bits(const RawVector<BvhNode>& a, const RawVector<BvhNode>& b) {
     return std::ranges::equal(a, b, [](const BvhNode& x, const BvhNode& y) {
         return std::memcmp(x.bounds, y.bounds, sizeof x.bounds) == 0 &&
                std::memcmp(x.child, y.child, sizeof x.child) == 0;
