@@ -100,7 +100,7 @@ LightTreeNode merge(const LightTreeNode& a, const LightTreeNode& b) {
 
 LightTree build_light_tree(const std::vector<Light>& lights, ThreadPool& pool) {
     LightTree result;
-    std::vector<Ref> refs;
+    RawVector<Ref> refs;
     std::vector<double> irradiances;
     for (uint32_t i = 0; i < lights.size(); ++i) {
         if (is_infinite(lights[i])) {
