@@ -110,8 +110,7 @@ PassSettings for_scene(const SceneView& scene, PassSettings pass, unsigned threa
     ThreadPool pool(light_walks ? threads : 1);
     if (pass.vlp_connections > 0 && light_walks) {
         const Pilot pilot = trace_pilot(scene, pass, pool);
-        if (pilot.vlps_per_path > 0)
-            pass.kappa = static_cast<float>(pass.vlp_candidates) / pilot.vlps_per_path;
+        if (pilot.vlps_per_path > 0) pass.kappa = static_cast<float>(pass.vlp_candidates) / pilot.vlps_per_path;
         pass.vlp_grid = pilot.grid;
     }
     if (!pass.adaptive || !pass.traces_light() || pass.weighting != Weighting::balance) return pass;

@@ -106,8 +106,8 @@ def settings() -> dict[str, str]:
     return {
         "VLP-BPT": f"BALANCED: L = {balanced.light_path_length}, K = {balanced.eye_path_length}, roulette, splats, "
         f"adaptive sampling, one VLP of {balanced.vlp_candidates} a hit, a light path for "
-        f"{balanced.pixels_per_light_path} pixels, up to eight times as many for caustics and no VLPs where a trial of "
-        "the scene finds that it pays; Sobol sequences.",
+        f"{balanced.pixels_per_light_path} pixels; where a trial of the scene finds that it pays, up to eight "
+        "times as many for caustics, up to eight VLPs where the camera looks, or none; Sobol sequences.",
         f"Cycles{_version('bpy')}": "path tracing on the CPU, multiple importance sampling; light tree, adaptive "
         "sampling, path guiding, clamps and denoiser off; its Sobol sequences. Spheres are smooth meshes, as its point "
         "clouds are wrong inside glass.",
