@@ -88,10 +88,10 @@ def test_an_exported_scene_renders_the_same_picture(folder: Path) -> None:
     exported = vlp_bpt(folder, "export", "box.blend", "-o", "box.vlp.npz").stdout
     assert re.match(r"box\.vlp\.npz: \d+ triangles, 0 spheres, \d+ instances, \d+ materials, 1 lights, ", exported)
     vlp_bpt(folder, "render", "box.vlp.npz", "-o", "snapshot.exr", "--samples", "3")
+    assert np.array_equal(read_image(folder / "snapshot.exr").pixels, read_image(folder / "blender.exr").pixels)
     vlp_bpt(folder, "render", "box.blend", "-o", "range.exr", "--iterations", "0:3")
-    snapshot = read_image(folder / "snapshot.exr").pixels
-    assert np.array_equal(snapshot, read_image(folder / "range.exr").pixels)
-    assert np.array_equal(snapshot, read_image(folder / "blender.exr").pixels)
+    vlp_bpt(folder, "render", "box.vlp.npz", "-o", "same.exr", "--iterations", "0:3")
+    assert np.array_equal(read_image(folder / "range.exr").pixels, read_image(folder / "same.exr").pixels)
 
 
 def test_strategies_of_a_blend(folder: Path) -> None:
