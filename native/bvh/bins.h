@@ -32,11 +32,11 @@ struct Bounds {
 
     Float8 sides;
 
-    Bounds(Float4 low, Float4 high) : sides(__builtin_shufflevector(low, -high, 0, 1, 2, 3, 4, 5, 6, 7)) {}
+    Bounds(Float4 low, Float4 high) : sides(_mm256_set_m128(-high, low)) {}
     void include(const Bounds& b) { sides = sides < b.sides ? sides : b.sides; }
     void include_numbers(const Bounds& b) { sides = b.sides < sides ? b.sides : sides; }  // leaves NaN out
-    Float4 low() const { return __builtin_shufflevector(sides, sides, 0, 1, 2, 3); }
-    Float4 high() const { return -__builtin_shufflevector(sides, sides, 4, 5, 6, 7); }
+    Float4 low() const { return _mm256_castps256_ps128(sides); }
+    Float4 high() const { return -_mm256_extractf128_ps(sides, 1); }
 #else
     Float4 sides[2];
 

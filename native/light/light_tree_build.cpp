@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "bvh/binary.h"
 #include "light/lamp_tree_build.h"
@@ -12,7 +13,7 @@
 namespace vlp {
 namespace {
 
-constexpr double k_pi_d = 3.14159265358979323846;
+constexpr double k_pi_d = std::numbers::pi;
 
 // Along the normals.
 float intensity_of(const Light& light) {
@@ -25,10 +26,11 @@ float intensity_of(const Light& light) {
     return static_cast<float>(std::min(mean * area, 1e30));
 }
 
-// What reaches a surface that faces it; of the environment, on average.
+// What an infinite light brings to a surface that faces it (W/m^2); the environment, to any on average. In a scene of radius 1 its
+// power comes through a disc of area pi, from every direction or from one.
 double irradiance_of(const Light& light) {
-    const double disc = k_pi_d;  // of a scene of radius 1
-    return static_cast<double>(power(light, 1)) / (light.kind == LightKind::environment ? 4 * disc : disc);
+    const double directions = light.kind == LightKind::environment ? 4.0 : 1.0;
+    return static_cast<double>(power(light, 1)) / (directions * k_pi_d);
 }
 
 float cosine_of_spread(const Light& light) { return light.spread / std::sqrt(1 + light.spread * light.spread); }

@@ -170,8 +170,8 @@ Round run_round(const SceneView& scene, PassSettings pass, const Cells& cells, u
 
     round.paths.reserve(cells.count());
     for (size_t i = 0; i < cells.count(); ++i) {
-        TriedPath& path = round.paths.emplace_back(scene, pass, light_scale(pass), number);
-        trace_eye_path(scene, pass, cache, {}, cells.x_of(i), cells.y_of(i), path);
+        round.paths.push_back({scene, pass, light_scale(pass), number});
+        trace_eye_path(scene, pass, cache, {}, cells.x_of(i), cells.y_of(i), round.paths.back());
     }
     return round;
 }
