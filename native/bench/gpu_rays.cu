@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <random>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -67,7 +68,7 @@ public:
     explicit OnDevice(size_t count) : count_(count) {
         check(cudaMalloc(&data_, std::max<size_t>(count, 1) * sizeof(T)));
     }
-    explicit OnDevice(const std::vector<T>& v) : OnDevice(v.size()) {
+    explicit OnDevice(std::span<const T> v) : OnDevice(v.size()) {
         check(cudaMemcpy(data_, v.data(), v.size() * sizeof(T), cudaMemcpyHostToDevice));
     }
     OnDevice(const OnDevice&) = delete;
@@ -135,7 +136,7 @@ double operations_per_second() {
 }
 
 // On average; those that a block lacks are not looked at.
-double triangles_in_a_block(const std::vector<TriangleBlock>& blocks) {
+double triangles_in_a_block(std::span<const TriangleBlock> blocks) {
     size_t triangles = 0;
     for (const TriangleBlock& block : blocks) {
         for (const uint32_t primitive : block.primitive) triangles += primitive != k_none;
