@@ -94,7 +94,7 @@ public:
     void update(const Scene& scene, const PassSettings& pass) override {
         counters.dropped = 0;
         counters.eye_samples = 0;
-        scene_ = scene.view();
+        scene_ = guided(scene.view(), pass);
         pass_ = pass;
         slots_.resize(has_vlps() ? light_vertex_capacity(pass) : 0);
         stored_.resize(has_vlps() ? candidate_capacity(pass) : 0);

@@ -44,6 +44,7 @@ public:
         device_.clear(counts_.data(), counts_.bytes());
         const uint64_t uploaded = counters.uploaded;
         place_scene(scene);
+        scene_ = guided(scene_, pass);
         place_film(scene.window(), pass);
         place_light_vertices(pass);
         place_wavefront(counters.uploaded != uploaded);

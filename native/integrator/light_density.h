@@ -30,14 +30,15 @@ VLP_HD inline float pdf_next_event_from(const SceneView& scene, uint32_t light_i
     return is_on_light(light, x_1) ? 0.0f : choice * pdf_next_event(scene, light, x_1.position, y_0, normal, direction);
 }
 
-// `next_event`: what pdf_next_event_from gives. `dist_squared` and `normal` (at y_0) are not looked at when the light is
+// `next_event`: what pdf_next_event_from gives. `dist_squared`, `y_0` and `normal` there are not looked at when the light is
 // infinite.
-VLP_HD inline LightEnd light_end(const SceneView& scene, uint32_t light_index, Vec3 y_0, Vec3 normal, Vec3 direction,
-                                 float dist_squared, float next_event) {
+VLP_HD inline LightEnd light_end(const SceneView& scene, uint32_t light_index, Vec3 x_1, Vec3 y_0, Vec3 normal,
+                                 Vec3 direction, float dist_squared, float next_event) {
     const Light& light = scene.lights[light_index];
     const float choice = pdf_choose_source(scene, light_index);
-    const EmissionPdf emission = pdf_emission(scene, light, y_0, normal, -direction);
-    if (is_infinite(light)) return {choice * emission.direction, next_event, emission.position};
+    const bool infinite = is_infinite(light);
+    const EmissionPdf emission = pdf_emission(scene, light, infinite ? x_1 : y_0, normal, -direction);
+    if (infinite) return {choice * emission.direction, next_event, emission.position};
     const float per_area = is_delta(light) ? 1.0f : abs_dot(normal, direction) / dist_squared;
     return {choice * emission.position, next_event * per_area, emission.direction / dist_squared};
 }

@@ -26,7 +26,8 @@ VLP_HD inline Contribution hit_light(const SceneView& scene, const PassSettings&
     const float eye_pdf =
         is_infinite(light) ? pdf_solid_angle : pdf_solid_angle * abs_dot(normal, direction) / dist_squared;
     const float next_event = pdf_next_event_from(scene, light_index, x_1, position, normal, direction);
-    const LightEnd end = light_end(scene, light_index, position, normal, direction, dist_squared, next_event);
+    const LightEnd end =
+        light_end(scene, light_index, x_1.position, position, normal, direction, dist_squared, next_event);
     Sum sum = strategy_sum<Sum>(pass, strategy_count(pass, 0, t));
     if (!eye.last().specular) sum.add(end.pdf_next_event / eye_pdf, strategy_count(pass, 1, t - 1));
     const float cos_x_1 = abs_dot(x_1.geometric_normal, direction);

@@ -63,8 +63,8 @@ VLP_HD inline uint32_t trace_light_path(const SceneView& scene, const PassSettin
         if (i == 1) {
             const float next_event =
                 pdf_next_event_from(scene, choice.index, y, emission.position, emission.normal, -ray.direction);
-            const LightEnd end = light_end(scene, choice.index, emission.position, emission.normal, -ray.direction,
-                                           edge.dist_squared, next_event);
+            const LightEnd end = light_end(scene, choice.index, y.position, emission.position, emission.normal,
+                                           -ray.direction, edge.dist_squared, next_event);
             vertex.next_event_ratio = end.pdf_emission > 0 ? end.pdf_next_event / end.pdf_emission : 0.0f;
         }
 

@@ -41,8 +41,8 @@ VLP_HD inline Contribution sample_light(const SceneView& scene, const PassSettin
         sum.add(at_x_1.pdf_light / pdf_next_event, strategy_count(pass, 0, n));
     }
     if (pass.traces_light() && (eye.t > 2 || pass.splats)) {
-        const LightEnd end =
-            light_end(scene, choice.index, event.position, event.normal, event.direction, dist_squared, pdf_next_event);
+        const LightEnd end = light_end(scene, choice.index, x_1.position, event.position, event.normal, event.direction,
+                                       dist_squared, pdf_next_event);
         const float ratio = end.pdf_emission / end.pdf_next_event * (end.pdf_next * cos_x_1 / eye.last().pdf_area);
         add_longer_light_walks(sum, pass, eye.vertices, n, 2, ratio, at_x_1.pdf_eye * eye.last().rev_geometry);
     }

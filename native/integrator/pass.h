@@ -40,6 +40,7 @@ struct PassSettings {
     uint32_t seed = 0;
     float kappa = 0;  // M N / V, V being what a pilot pass of the scene stored: how often a connection draws a VLP
     VlpGrid vlp_grid;  // where those of the pilot lay
+    LightGuide light_guide;  // where light paths are best begun
     Filter filter = Filter::blackman_harris;
     float filter_width = 1.5f;  // full width (pixels)
 
@@ -54,6 +55,12 @@ struct PassSettings {
     // Whether an iteration has a light pass.
     VLP_HD bool traces_light() const { return kappa > 0 || splats; }
 };
+
+// The scene as the passes see it: with what was learnt of its lights.
+inline SceneView guided(SceneView scene, const PassSettings& pass) {
+    scene.light_guide = pass.light_guide;
+    return scene;
+}
 
 // What one find adds to a pixel, made as dim as the settings ask: a bias against bright specks.
 VLP_HD inline Rgb clamped(const PassSettings& pass, uint32_t n, Rgb light) {

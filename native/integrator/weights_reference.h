@@ -129,7 +129,7 @@ inline std::vector<double> strategy_densities(const SceneView& scene, const Pass
     // Of each vertex in the light walk and in the eye walk; the lens is chosen alike in every strategy.
     std::vector<double> by_light(n, 1), by_eye(n, 1);
     const double choice = pdf_choose_source(scene, path.light);
-    const EmissionPdf emission = pdf_emission(scene, light, position_0, normal_0, x_0.to_eye);
+    const EmissionPdf emission = pdf_emission(scene, light, infinite ? position_1 : position_0, normal_0, x_0.to_eye);
     if (infinite) {  // x_0 is a direction, and x_1 is where a ray through the disc around the scene meets a surface
         by_light[0] = choice * emission.direction;
         by_light[1] = emission.position * std::fabs(dot(wide(x_0.to_eye), wide(normal_1)));

@@ -82,21 +82,37 @@ VLP_HD inline EnvironmentSample environment_sample(const EnvironmentView& e, Vec
     return {environment_to_world(e, d), environment_texel_pdf(e, row.pdf * column.pdf, sin_theta)};
 }
 
-VLP_HD inline Emission environment_sample_emission(const EnvironmentView& environment, const Light& light, Vec3 center,
-                                                   float radius, Vec2 u_position, Vec2 u_direction) {
+VLP_HD inline Emission environment_sample_emission(const EnvironmentView& environment, const Light& light,
+                                                   const Portals& portals, Vec3 center, float radius, Vec2 u_position,
+                                                   Vec2 u_direction) {
     const EnvironmentSample from = environment_sample(environment, u_direction);
     Emission e;
     e.direction = e.normal = -from.direction;
-    e.position = sample_scene_disc(center, radius, e.direction, u_position);
-    e.pdf_position = pdf_scene_disc(radius);
+    e.position = sample_scene_disc(portals, center, radius, e.direction, u_position);
+    e.pdf_position = pdf_scene_disc(portals, radius, e.position, e.direction);
     e.pdf_direction = from.pdf_solid_angle;
     e.weight = environment_radiance(environment, light, from.direction) / (e.pdf_position * e.pdf_direction);
     return e;
 }
 
+// Density per solid angle of next event at `receiver`.
+VLP_HD inline float environment_pdf_next_event(const EnvironmentView& environment, const Portals& portals,
+                                               Vec3 receiver, Vec3 direction) {
+    const float anywhere = environment_pdf(environment, direction);
+    return portals.in_next_event ? pdf_through_portals(portals, anywhere, receiver, direction) : anywhere;
+}
+
 VLP_HD inline NextEvent environment_sample_next_event(const EnvironmentView& environment, const Light& light,
-                                                      float scene_radius, Vec3 receiver, Vec2 u) {
-    const EnvironmentSample from = environment_sample(environment, u);
+                                                      const Portals& portals, float scene_radius, Vec3 receiver,
+                                                      Vec2 u) {
+    EnvironmentSample from{};
+    const uint32_t portal = portals.in_next_event ? choose_portal(portals, u.x) : k_none;
+    if (portal == k_none || !sample_through_portal(portals, portal, receiver, u, from.direction)) {
+        from = environment_sample(environment, u);
+    }
+    if (portals.in_next_event) {
+        from.pdf_solid_angle = environment_pdf_next_event(environment, portals, receiver, from.direction);
+    }
     NextEvent e;
     e.direction = from.direction;
     e.normal = -e.direction;

@@ -62,7 +62,8 @@ VLP_HD inline Emission sample_emission(const SceneView& scene, const Light& ligh
         case LightKind::spot:
             return spot_sample_emission(light, u_position, u_direction);
         case LightKind::sun:
-            return sun_sample_emission(light, scene.center, scene.radius, u_position, u_direction);
+            return sun_sample_emission(light, scene.light_guide.portals, scene.center, scene.radius, u_position,
+                                       u_direction);
         case LightKind::area:
             return area_sample_emission(light, u_position, u_direction);
         case LightKind::triangle:
@@ -70,14 +71,15 @@ VLP_HD inline Emission sample_emission(const SceneView& scene, const Light& ligh
         case LightKind::sphere:
             return sphere_sample_emission(light, u_position, u_direction);
         case LightKind::environment:
-            return environment_sample_emission(scene.environment, light, scene.center, scene.radius, u_position,
-                                               u_direction);
+            return environment_sample_emission(scene.environment, light, scene.light_guide.portals, scene.center,
+                                               scene.radius, u_position, u_direction);
     }
     return {};
 }
 
 // The densities of the ray from `position` in `direction`, their product being that of `sample_emission`. 0 where no
-// light path starts: the inner side of a lamp's sphere, directions that the lamp does not shine in.
+// light path starts: the inner side of a lamp's sphere, directions that the lamp does not shine in. `position`: of an infinite
+// light any point of the ray.
 VLP_HD inline EmissionPdf pdf_emission(const SceneView& scene, const Light& light, Vec3 position, Vec3 normal,
                                        Vec3 direction) {
     switch (light.kind) {
@@ -86,14 +88,15 @@ VLP_HD inline EmissionPdf pdf_emission(const SceneView& scene, const Light& ligh
         case LightKind::spot:
             return spot_pdf_emission(light, position, normal, direction);
         case LightKind::sun:
-            return sun_pdf_emission(light, scene.radius, direction);
+            return sun_pdf_emission(light, scene.light_guide.portals, scene.radius, position, direction);
         case LightKind::area:
             return area_pdf_emission(light, direction);
         case LightKind::triangle:
         case LightKind::sphere:
             return surface_pdf_emission(light, position, normal, direction);
         case LightKind::environment:
-            return {pdf_scene_disc(scene.radius), environment_pdf(scene.environment, -direction)};
+            return {pdf_scene_disc(scene.light_guide.portals, scene.radius, position, direction),
+                    environment_pdf(scene.environment, -direction)};
     }
     return {};
 }
@@ -120,7 +123,8 @@ VLP_HD inline NextEvent sample_next_event(const SceneView& scene, const Light& l
             return e;
         }
         case LightKind::environment:
-            return environment_sample_next_event(scene.environment, light, scene.radius, receiver, u);
+            return environment_sample_next_event(scene.environment, light, scene.light_guide.portals, scene.radius,
+                                                 receiver, u);
     }
     return {};
 }
@@ -142,7 +146,7 @@ VLP_HD inline float pdf_next_event(const SceneView& scene, const Light& light, V
         case LightKind::sphere:
             return pdf_sphere_shape(light.position, light.radius, receiver, position, normal);
         case LightKind::environment:
-            return environment_pdf(scene.environment, direction);
+            return environment_pdf_next_event(scene.environment, scene.light_guide.portals, receiver, direction);
     }
     return 0;
 }

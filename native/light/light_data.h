@@ -49,6 +49,32 @@ struct LightTreeView {
     float infinite_irradiance = 0;
 };
 
+// Spheres that light from infinitely far away comes through on its way to what the picture shows, as a pilot found them: the
+// windows of a room, or all that the camera looks at in a wide land. See portals.h.
+inline constexpr uint32_t k_max_portals = 4;
+
+struct Portals {
+    uint32_t count = 0;
+    bool in_next_event = false;  // of the environment, too
+    Vec3 center[k_max_portals]{};
+    float radius[k_max_portals]{};
+    float share[k_max_portals]{};  // of what is sent through them; their sum is 1
+};
+
+// Lights that light paths begin at more often than their power has it, as a pilot found that the picture shows their light.
+inline constexpr uint32_t k_max_favoured = 16;
+
+struct FavouredLights {
+    uint32_t count = 0;
+    uint32_t light[k_max_favoured]{};
+    uint32_t below[k_max_favoured]{};  // a Distribution over them
+};
+
+struct LightGuide {
+    Portals portals;
+    FavouredLights favoured;
+};
+
 struct LampNode;
 
 // Lamps with a shape (radius or area), found by rays but not blocking them.

@@ -1,22 +1,11 @@
 // Suns: a disc at infinity around one direction, or that direction alone when the angle is 0.
 #pragma once
 
-#include "core/frame.h"
-#include "core/warp.h"
 #include "light/light_data.h"
 #include "light/light_sample.h"
+#include "light/portals.h"
 
 namespace vlp {
-
-// The ends of infinite lights' paths: a disc as wide as the scene that touches its sphere from behind.
-VLP_HD inline Vec3 sample_scene_disc(Vec3 center, float radius, Vec3 direction, Vec2 u) {
-    constexpr float k_beyond = 1.01f;  // so that rounding cannot put the disc inside the sphere
-    const Vec2 d = radius * sample_disc(u);
-    const Frame frame = make_frame(direction);
-    return center + frame.tangent * d.x + frame.bitangent * d.y - direction * (k_beyond * radius);
-}
-
-VLP_HD inline float pdf_scene_disc(float radius) { return k_inv_pi / square(radius); }
 
 // A point far outside the scene toward an infinite light.
 VLP_HD inline Vec3 beyond_scene(Vec3 receiver, Vec3 direction, float radius) {
@@ -43,19 +32,22 @@ VLP_HD inline Vec3 sun_sample_direction(const Light& light, Vec2 u) {
     return make_frame(light.normal).to_world(sample_cone(u, sun_one_minus_cos(light)));
 }
 
-VLP_HD inline Emission sun_sample_emission(const Light& light, Vec3 center, float radius, Vec2 u_position,
-                                           Vec2 u_direction) {
+VLP_HD inline Emission sun_sample_emission(const Light& light, const Portals& portals, Vec3 center, float radius,
+                                           Vec2 u_position, Vec2 u_direction) {
     Emission e;
     e.direction = e.normal = sun_sample_direction(light, u_direction);
-    e.position = sample_scene_disc(center, radius, e.direction, u_position);
-    e.pdf_position = pdf_scene_disc(radius);
+    e.position = sample_scene_disc(portals, center, radius, e.direction, u_position);
+    e.pdf_position = pdf_scene_disc(portals, radius, e.position, e.direction);
     e.pdf_direction = light.radius == 0 ? 1 : pdf_cone(sun_one_minus_cos(light));
     e.weight = light.radiance / (e.pdf_position * e.pdf_direction);
     return e;
 }
 
-VLP_HD inline EmissionPdf sun_pdf_emission(const Light& light, float radius, Vec3 direction) {
-    return {pdf_scene_disc(radius), light.radius == 0 ? 1 : sun_pdf_direction(light, direction)};
+// `point`: any of the ray.
+VLP_HD inline EmissionPdf sun_pdf_emission(const Light& light, const Portals& portals, float radius, Vec3 point,
+                                           Vec3 direction) {
+    return {pdf_scene_disc(portals, radius, point, direction),
+            light.radius == 0 ? 1 : sun_pdf_direction(light, direction)};
 }
 
 VLP_HD inline NextEvent sun_sample_next_event(const Light& light, float scene_radius, Vec3 receiver, Vec2 u) {

@@ -9,6 +9,7 @@
 
 #include "core/parallel.h"
 #include "integrator/light_tracing.h"
+#include "renderer/light_guide.h"
 #include "renderer/trial.h"
 
 namespace vlp {
@@ -103,11 +104,13 @@ PassSettings as_it_pays(const SceneView& scene, PassSettings pass, ThreadPool& p
 
 }  // namespace
 
-PassSettings for_scene(const SceneView& scene, PassSettings pass, unsigned threads) {
-    const bool light_walks = pass.light_path_length > 0 && pass.light_paths > 0 && scene.light_count > 0;
+PassSettings for_scene(const SceneView& scene_alone, PassSettings pass, unsigned threads) {
+    const bool light_walks = pass.light_path_length > 0 && pass.light_paths > 0 && scene_alone.light_count > 0;
     pass.splats &= light_walks;
     pass.kappa = 0;
-    ThreadPool pool(light_walks ? threads : 1);
+    ThreadPool pool(threads);
+    pass.light_guide = pass.weighting == Weighting::uniform ? LightGuide{} : learn_light_guide(scene_alone, pass, pool);
+    const SceneView scene = guided(scene_alone, pass);
     if (pass.vlp_connections > 0 && light_walks) {
         const Pilot pilot = trace_pilot(scene, pass, pool);
         if (pilot.vlps_per_path > 0) pass.kappa = static_cast<float>(pass.vlp_candidates) / pilot.vlps_per_path;

@@ -56,7 +56,7 @@ StrategyRenderer::StrategyRenderer(std::shared_ptr<const Scene> scene, const Pas
 }
 
 void StrategyRenderer::iterate(uint32_t iteration) {
-    const SceneView& scene = scene_->view();
+    const SceneView scene = guided(scene_->view(), pass_);
     LightSink splats{*this};
     uint32_t end = 0;
     for (uint32_t path = 0; path < pass_.light_paths && pass_.traces_light(); ++path) {

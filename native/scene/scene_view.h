@@ -79,6 +79,7 @@ struct SceneView {
     bool has_transparency = false;  // some material lets light pass straight through
     bool hides_from_camera = false;  // some instance is not seen by the camera
     Camera camera;
+    LightGuide light_guide;       // what a pilot of the render learnt
     Vec3 center;                  // of the sphere around every surface and lamp
     float radius = 1;
     const float* albedo_tables = nullptr;  // see bsdf/albedo.h

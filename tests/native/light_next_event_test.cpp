@@ -49,6 +49,8 @@ TEST(LightNextEvent, SamplesFollowTheDensityOfHits) {
         if (is_delta(s.light)) continue;
         for (const Receiver& r : receivers()) {
             SCOPED_TRACE(s.name + ", " + r.name);
+            // The bins would be wider than a portal from there.
+            if (s.view.light_guide.portals.count > 0 && r.name == std::string("far")) continue;
             const DirectionMap map = directions_toward(s, r.position, random);
             const auto draw = [&](float (&point)[2]) {
                 const NextEvent e = sample_next_event(s.scene(), s.light, r.position, random.next_2d());

@@ -142,6 +142,40 @@ TEST(LightChoice, WidthsAreExact) {
     EXPECT_EQ(choose_source(SceneView{}, 7).index, k_none);
 }
 
+// Favoured lights are drawn as often as their density says, and the others no less than half as often as by power.
+TEST(LightChoice, FavouredLights) {
+    const double powers[] = {1, 2, 3, 4, 0.5};
+    const std::vector<uint32_t> below = make_distribution(powers);
+    const double worth[] = {3, 1};
+    const std::vector<uint32_t> among = make_distribution(worth);
+    SceneView scene;
+    scene.light_count = 5;
+    scene.light_choice = {below.data(), 5};
+    SceneView guided = scene;
+    FavouredLights& favoured = guided.light_guide.favoured;
+    favoured.count = 2;
+    favoured.light[0] = 4, favoured.light[1] = 1;
+    std::copy(among.begin(), among.end(), favoured.below);
+    double sum = 0;
+    for (uint32_t i = 0; i < 5; ++i) {
+        const auto share = static_cast<double>(pdf_choose_source(guided, i));
+        const double expected = 0.5 * static_cast<double>(pdf_choose_source(scene, i)) + (i == 4   ? 0.375
+                                                                                          : i == 1 ? 0.125
+                                                                                                   : 0.0);
+        EXPECT_NEAR(share, expected, 1e-6);
+        sum += share;
+    }
+    EXPECT_NEAR(sum, 1, 1e-6);
+    constexpr uint32_t k_draws = 1 << 16;
+    double drawn[5]{};
+    for (uint32_t i = 0; i < k_draws; ++i) {
+        const DiscreteSample choice = choose_source(guided, (i << 16) + 0x8000u);  // evenly over all numbers
+        ASSERT_EQ(choice.pdf, pdf_choose_source(guided, choice.index));
+        drawn[choice.index] += 1.0 / k_draws;
+    }
+    for (uint32_t i = 0; i < 5; ++i) EXPECT_NEAR(drawn[i], static_cast<double>(pdf_choose_source(guided, i)), 1e-4);
+}
+
 // One lamp of 10,000 chosen at a time gives the sum over all of them, to 5 standard errors (6e-7).
 TEST(LightChoice, TenThousandLamps) {
     Random random{k_seed};

@@ -88,6 +88,16 @@ inline LightScene environment_picture(const char* name, uint32_t width, uint32_t
     return s;
 }
 
+// Two that overlap, seen from most places.
+inline Portals two_portals() {
+    Portals p;
+    p.count = 2;
+    p.in_next_event = true;
+    p.center[0] = {2.0f, -1.0f, 1.0f}, p.radius[0] = 2.2f, p.share[0] = 0.625f;
+    p.center[1] = {0.0f, -3.0f, 0.0f}, p.radius[1] = 1.6f, p.share[1] = 0.375f;
+    return p;
+}
+
 inline std::vector<LightScene> light_scenes() {
     const Vec3 o = k_light_position;
     const double pi = 3.14159265358979323846;
@@ -121,6 +131,11 @@ inline std::vector<LightScene> light_scenes() {
     s.push_back(environment_picture("picture", 8, 4, false));
     s.push_back(environment_picture("picture_turned", 16, 9, true));
     s.push_back(environment_picture("picture_of_few_rows", 5, 3, true));
+    s.emplace_back("sun_through_portals", make_sun(turned({}), k_power, 0), 3 * disc);
+    s.emplace_back("sun_wide_through_portals", make_sun(turned({}), k_power, 2.0f), -1);
+    s.emplace_back("environment_through_portals", make_environment(k_power), 3 * 4 * pi * disc);
+    s.push_back(environment_picture("picture_through_portals", 16, 9, true));
+    for (size_t i = s.size() - 4; i < s.size(); ++i) s[i].view.light_guide.portals = two_portals();
     for (LightScene& l : s) {
         // The disc that light comes through faces each ray, not the sun's axis: 2 / (1 + cos) times the irradiance.
         if (l.light.kind == LightKind::sun) l.watts = 3 * disc * 2 / (1 + static_cast<double>(l.light.cos_outer));

@@ -119,6 +119,22 @@ struct LightAndCamera {
     friend void PrintTo(const LightAndCamera& p, std::ostream* out) { *out << p.light.name; }
 };
 
+// Portals, and a favourite among the lights.
+LightGuide some_guide(const SceneView& scene) {
+    LightGuide guide;
+    Portals& portals = guide.portals;
+    portals.count = 2;
+    portals.in_next_event = true;
+    for (uint32_t i = 0; i < 2; ++i) {
+        portals.center[i] = scene.center + Vec3{0.2f, -0.1f, 0.3f} * (scene.radius * static_cast<float>(i));
+        portals.radius[i] = (0.2f + 0.3f * static_cast<float>(i)) * scene.radius;
+        portals.share[i] = 0.5f;
+    }
+    guide.favoured.count = 1;
+    guide.favoured.light[0] = scene.light_count / 2;
+    return guide;
+}
+
 class WeightsTest : public ::testing::TestWithParam<LightAndCamera> {};
 
 TEST_P(WeightsTest, EqualTheReference) {
@@ -142,7 +158,8 @@ TEST_P(WeightsTest, EqualTheReference) {
             pass.seed = 11;
             pass = with_kappa(scene->view(), pass);
             for (uint32_t iteration = 0; iteration < 3; ++iteration) {
-                compare_weights(scene->view(), pass, iteration, errors);
+                if (iteration == 2) pass.light_guide = some_guide(scene->view());
+                compare_weights(guided(scene->view(), pass), pass, iteration, errors);
                 if (HasFatalFailure()) return;
             }
         }
