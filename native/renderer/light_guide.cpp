@@ -135,12 +135,16 @@ Portal portal_around(const Finds& lines, Vec3 center, double scene_radius) {
     return best;
 }
 
-// Up to `count` portals, each the best for the lines that the ones before let by, of those around places where two lines cross.
-Portals fit_portals(Finds lines, uint32_t count, float scene_radius) {
+// Portals, each the best for the lines that the ones before let by, of those around places where two lines cross. Its `share` is
+// the worth of its lines.
+Portals fit_portals(const Finds& all_lines, float scene_radius) {
     constexpr uint32_t k_tries = 96;
+    constexpr size_t k_most_lines = 512;
+    const size_t every = (all_lines.size() + k_most_lines - 1) / k_most_lines;
+    Finds lines;
+    for (size_t i = 0; i < all_lines.size(); i += every) lines.push_back(all_lines[i]);
     Portals portals;
-    double all = 0;
-    while (portals.count < count && lines.size() >= k_least_finds) {
+    while (portals.count < k_max_portals && lines.size() >= k_least_finds) {
         Portal best;
         for (uint32_t i = 0; i < k_tries; ++i) {
             const auto any = [&](uint32_t which) -> const Find& { return lines[hash(i, which) % lines.size()]; };
@@ -153,14 +157,20 @@ Portals fit_portals(Finds lines, uint32_t count, float scene_radius) {
         portals.center[portals.count] = best.center;
         portals.radius[portals.count] = static_cast<float>(best.radius);
         portals.share[portals.count++] = static_cast<float>(best.worth);
-        all += best.worth;
         const float radius_squared = square(static_cast<float>(best.radius));
         std::erase_if(lines, [&](const Find& line) {
             return length_squared(cross(best.center - line.x_1, line.direction)) <= radius_squared;
         });
     }
-    for (uint32_t i = 0; i < portals.count; ++i)
-        portals.share[i] = static_cast<float>(static_cast<double>(portals.share[i]) / all);
+    return portals;
+}
+
+// The first `count`, with shares that sum to 1.
+Portals first_of(Portals portals, uint32_t count) {
+    portals.count = count;
+    float all = 0;
+    for (uint32_t i = 0; i < count; ++i) all += portals.share[i];
+    for (uint32_t i = 0; i < k_max_portals; ++i) portals.share[i] = i < count ? portals.share[i] / all : 0;
     return portals;
 }
 
@@ -168,11 +178,12 @@ Portals learn_portals(const SceneView& scene, const Finds& fit, const Finds& che
     const auto from_infinity = [&](const Find& f) {
         return is_infinite(scene.lights[f.light]) && (f.indirect || !light_paths);
     };
-    const Finds lines = only(fit, from_infinity), others = only(check, from_infinity);
+    const Finds others = only(check, from_infinity);
+    const Portals fitted = fit_portals(only(fit, from_infinity), scene.radius);
     Portals best;
     double least = k_most_left;
-    for (uint32_t count = 1; count <= k_max_portals; ++count) {
-        const Portals portals = fit_portals(lines, count, scene.radius);
+    for (uint32_t count = 1; count <= fitted.count; ++count) {
+        const Portals portals = first_of(fitted, count);
         const double left = left_of(others, [&](const Find& f) {
             return static_cast<double>(pdf_scene_disc(portals, scene.radius, f.x_1, -f.direction) /
                                        pdf_scene_disc(scene.radius));
@@ -180,14 +191,13 @@ Portals learn_portals(const SceneView& scene, const Finds& fit, const Finds& che
         constexpr double k_worth_another = 0.9;  // each portal costs time wherever densities are asked for
         if (left < least * (count == 1 ? 1 : k_worth_another)) least = left, best = portals;
     }
-    best.in_next_event = best.count > 0;
-    const double left =
-        left_of(only(check, [&](const Find& f) { return scene.lights[f.light].kind == LightKind::environment; }),
-                [&](const Find& f) {
-                    const float anywhere = environment_pdf(scene.environment, f.direction);
-                    return static_cast<double>(pdf_through_portals(best, anywhere, f.x_1, f.direction) / anywhere);
-                });
-    best.in_next_event &= left < k_most_left_next_event;
+    if (best.count == 0) return best;
+    const auto of_sky = [&](const Find& f) { return scene.lights[f.light].kind == LightKind::environment; };
+    const double left = left_of(only(check, of_sky), [&](const Find& f) {
+        const float anywhere = environment_pdf(scene.environment, f.direction);
+        return static_cast<double>(pdf_through_portals(best, anywhere, f.x_1, f.direction) / anywhere);
+    });
+    best.in_next_event = left < k_most_left_next_event;
     return light_paths || best.in_next_event ? best : Portals{};
 }
 
