@@ -145,8 +145,8 @@ VLP_HD VLP_FORCE_INLINE bool visit_hits(const TraversalRay& ray, const TriangleB
     VLP_NO_UNROLL
     for (uint32_t i = 0; i < k_block_width && block.primitive[i] != k_none; ++i) {
         const auto corner = [&](uint32_t v) {
-            const auto& k = ray.sheared.k;
-            return Vec3{block.vertex[v][k[0]][i], block.vertex[v][k[1]][i], block.vertex[v][k[2]][i]};
+            const auto& [x, y, z] = ray.sheared.k;
+            return Vec3{block.vertex[v][x][i], block.vertex[v][y][i], block.vertex[v][z][i]};
         };
         const TriangleHit hit = intersect(ray.sheared, corner(0), corner(1), corner(2), t_max);
         if (hit.found && visit(i, hit.t, hit.u, hit.v)) return true;

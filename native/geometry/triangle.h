@@ -23,8 +23,8 @@ VLP_HD VLP_FORCE_INLINE float rounded_product(float a, float b) {
 
 // A ray in the space where it runs along +z: axis `k[2]` is its longest, the others are sheared.
 struct ShearedRay {
-    alignas(16) float origin[4];  // along the axes k; the fourth of both: room for a vector
-    alignas(16) uint32_t k[4];
+    float origin[3];  // along the axes k
+    uint32_t k[3];
     float shear_x, shear_y, scale_z;
 };
 

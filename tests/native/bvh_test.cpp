@@ -77,37 +77,6 @@ Mesh soup(std::mt19937& random, int count, float size, float edge) {
     return mesh;
 }
 
-#if VLP_AVX2
-
-// Where vectors prepare a ray, they give the numbers that each axis gives by itself.
-TEST(TraversalRay, IsTheSameByLanesAndByAxes) {
-    std::mt19937 random(5);
-    const float odd[] = {0.0f, -0.0f, 1.0f, -1.0f, 1e-20f, -1e-12f, 0.5f, 3e8f};
-    for (int i = 0; i < 20000; ++i) {
-        Vec3 origin = random_point(random, 10), direction = random_point(random, 1);
-        for (float* x : {&direction.x, &direction.y, &direction.z, &origin.x, &origin.y, &origin.z}) {
-            if (random() % 3 == 0) *x = odd[random() % std::size(odd)];
-        }
-        if (!is_valid({origin, direction})) continue;
-        const TraversalRay a = detail::traversal_ray_by_axis(origin, direction);
-        const TraversalRay b = detail::traversal_ray_by_lanes(origin, direction);
-        for (int axis = 0; axis < 3; ++axis) {
-            ASSERT_EQ(bits_of(a.slope[axis]), bits_of(b.slope[axis]));
-            ASSERT_EQ(a.entry[axis], b.entry[axis]);
-            ASSERT_EQ(a.exit[axis], b.exit[axis]);
-            ASSERT_EQ(a.near_row[axis], b.near_row[axis]);
-            ASSERT_EQ(a.far_row[axis], b.far_row[axis]);
-            ASSERT_EQ(a.sheared.k[axis], b.sheared.k[axis]);
-            ASSERT_EQ(a.sheared.origin[axis], b.sheared.origin[axis]);
-        }
-        ASSERT_EQ(a.sheared.shear_x, b.sheared.shear_x);
-        ASSERT_EQ(a.sheared.shear_y, b.sheared.shear_y);
-        ASSERT_EQ(bits_of(a.sheared.scale_z), bits_of(b.sheared.scale_z));
-    }
-}
-
-#endif
-
 TEST(Bvh, EmptyScenes) {
     RayScene scene;
     scene.build();
