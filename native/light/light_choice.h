@@ -1,4 +1,4 @@
-// Which light a light path starts from, in proportion to power, and which one next event asks, by what it may bring.
+// Which light a light path starts from, by power and what a pilot learnt, and which one next event asks, by what it may bring.
 #pragma once
 
 #include "geometry/surface.h"
@@ -7,7 +7,7 @@
 
 namespace vlp {
 
-// Half of all light paths begin at favoured lights, where there are any.
+// The probability with which a light path starts from `light`: by power, and for half of them among favoured lights, if any.
 VLP_HD inline float pdf_choose_source(const SceneView& scene, uint32_t light) {
     const float by_power = pdf(scene.light_choice, light);
     const FavouredLights& favoured = scene.light_guide.favoured;

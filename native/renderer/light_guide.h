@@ -6,8 +6,8 @@
 
 namespace vlp {
 
-// Portals and favoured lights, where they make the light paths of a render worth at least so much more as k_least_gain says.
-// The same on every machine, however many threads. `pass` as the user has it.
+// Portals and favoured lights, where they take enough of the variance of what light paths bring (k_most_left). The same on every
+// machine, however many threads. `pass` as the user has it.
 LightGuide learn_light_guide(const SceneView& scene, const PassSettings& pass, ThreadPool& pool);
 
 }  // namespace vlp

@@ -15,9 +15,9 @@ struct Pilot {
 };
 Pilot trace_pilot(const SceneView& scene, const PassSettings& pass, ThreadPool& pool);
 
-// The settings with what the scene makes of them: the light guide, kappa and the VLPs' grid, and splats only where there are light
-// paths. Where
-// sampling is adaptive, light paths and connections are as well: R, and C = 0 where that is better (see trial.h).
+// The settings with what the scene makes of them: the light guide, kappa and the VLPs' grid, and splats only where there are
+// light paths. Where sampling is adaptive, light paths and connections are as well: R, F, and C = 0 where that is better (see
+// trial.h).
 PassSettings for_scene(const SceneView& scene, PassSettings pass, unsigned threads = 1);
 
 }  // namespace vlp
