@@ -232,6 +232,8 @@ void bind_renderer(nb::module_& m) {
         .def_prop_ro("light_rounds", [](const Renderer& r) { return r.pass().light_rounds; })
         .def_prop_ro("first_connections",
                      [](const Renderer& r) { return r.pass().kappa > 0 ? r.pass().connections_at(2) : 0; })
+        .def_prop_ro("portals", [](const Renderer& r) { return r.pass().light_guide.portals.count; })
+        .def_prop_ro("favoured_lights", [](const Renderer& r) { return r.pass().light_guide.favoured.count; })
         .def_prop_ro("paths",
                      [](const Renderer& r) {
                          return r.iteration_count() * (r.film().window().pixel_count() + traced_light_paths(r));

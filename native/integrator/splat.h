@@ -41,7 +41,7 @@ VLP_HD inline void connect_to_lens(const SceneView& scene, const PassSettings& p
     const uint32_t s = y.index() + 1;
     Splat splat{{.s = s, .t = 1, .vlp = &y}, seen.film};
     splat.found.value = y.throughput * at_y.f * through * (eye_pdf / static_cast<float>(pass.splat_paths()));
-    auto sum = strategy_sum<typename SumFor<Sink>::Type>(pass, splat_count(pass, s));
+    auto sum = strategy_sum<typename SumFor<Sink>::Type>(pass, splat_count(pass, s), 1);
     add_shorter_light_walks(sum, pass, &y, s, s + 1, eye_pdf / y.pdf_area, at_y.pdf_light * y.rev_geometry);
     splat.found.weight = sum.weight();
     splat.found.shares = sum.shares();

@@ -42,9 +42,10 @@ VLP_HD inline float splat_count(const PassSettings& pass, uint32_t s) {
     return splats_from(pass, s - 1) ? static_cast<float>(pass.splat_paths()) : 0.0f;
 }
 
-// What connections to VLPs have of all strategies that could have made a path, and what those at z_1 alone have.
+// What connections to VLPs have of all strategies that could have made a path, what those at z_1 alone have, and what joining
+// light vertices to the lens has.
 struct ConnectionShares {
-    float all = 0, first = 0;
+    float all = 0, first = 0, splats = 0;
 };
 
 // Sums what the other strategies have relative to the one at hand.
@@ -53,8 +54,8 @@ struct StrategySum {
     float own_count;
     float sum = 1;
 
-    // `ratio` = density of the other strategy over the density of this one, without the counts. `connection`: t, if it is a
-    // connection to a VLP.
+    // `ratio` = density of the other strategy over the density of this one, without the counts. `connection`: t, if it joins
+    // to a light vertex; of the lens t is 1.
     VLP_HD void add(float ratio, float count, uint32_t /*connection*/ = 0) {
         const float relative = ratio * count / own_count;
         switch (weighting) {
@@ -73,10 +74,10 @@ struct StrategySum {
     VLP_HD ConnectionShares shares() const { return {}; }  // nobody asks
 };
 
-// The same, with what connections to VLPs have of it.
+// The same, with what connections to light vertices have of it.
 struct ConnectionSum {
     StrategySum all;
-    float connections = 0, first = 0;
+    float connections = 0, first = 0, splats = 0;
 
     VLP_HD ConnectionSum(const StrategySum& own, uint32_t connection) : all(own) { count(own.sum, connection); }
     VLP_HD void add(float ratio, float count_, uint32_t connection = 0) {
@@ -85,12 +86,13 @@ struct ConnectionSum {
         count(all.sum - before, connection);
     }
     VLP_HD float weight() const { return all.weight(); }
-    VLP_HD ConnectionShares shares() const { return {connections / all.sum, first / all.sum}; }
+    VLP_HD ConnectionShares shares() const { return {connections / all.sum, first / all.sum, splats / all.sum}; }
 
 private:
     VLP_HD void count(float part, uint32_t connection) {
-        if (connection > 0) connections += part;
+        if (connection > 1) connections += part;
         if (connection == 2) first += part;
+        if (connection == 1) splats += part;
     }
 };
 
@@ -125,7 +127,7 @@ VLP_HD inline void add_longer_light_walks(Sum& sum, const PassSettings& pass, co
     for (uint32_t k = k_first; k <= pass.light_path_length + 1 && k + t_least <= n && ratio > 0; ++k) {
         const VertexDensity &end = eye[n - 1 - k], &freed = eye[n - k];  // x_k and x_{k-1}
         if (!end.specular && !freed.specular)
-            sum.add(ratio, k + 1 < n ? strategy_count(pass, k, n - k) : splat_count(pass, k), k + 1 < n ? n - k : 0);
+            sum.add(ratio, k + 1 < n ? strategy_count(pass, k, n - k) : splat_count(pass, k), n - k);
         ratio *= k == k_first ? next_ratio : freed.rev_ratio;
     }
 }

@@ -77,8 +77,25 @@ bool finds_all_unconnected(const SceneView& scene, const PassSettings& pass) {
     return std::none_of(scene.lights, scene.lights + scene.light_count, [](const Light& l) { return is_delta(l); });
 }
 
+// Whether some surface throws light together, as a mirror or a lens does. Light paths alone find that well, and a trial may
+// miss where.
+bool may_focus(const SceneView& scene) {
+    const auto is_sharp = [](const Lobe& lobe) {
+        return lobe.kind != LobeKind::diffuse && lobe.kind != LobeKind::translucent && lobe.alpha < 0.1f;
+    };
+    for (uint32_t i = 0; i < scene.instance_count; ++i) {
+        const InstanceView& instance = scene.instances[i];
+        for (uint32_t slot = 0; slot < instance.slot_count; ++slot) {
+            const Material& material = scene.materials[scene.material_of_slot[instance.first_material + slot]];
+            const Lobe* const lobes = scene.lobes + material.first_lobe;
+            if (std::any_of(lobes, lobes + material.lobe_count, is_sharp)) return true;
+        }
+    }
+    return false;
+}
+
 // As a trial finds it best: how many light paths splat, how many connections the surface that the camera sees has, and none at
-// all where they bring less than they take.
+// all where they bring less than they take; no light paths either where neither pays.
 PassSettings as_it_pays(const SceneView& scene, PassSettings pass, ThreadPool& pool) {
     // What connections have to win: part of what the trial counts against a render without them would fall to splats.
     constexpr double k_least_gain = 1.05;
@@ -92,12 +109,21 @@ PassSettings as_it_pays(const SceneView& scene, PassSettings pass, ThreadPool& p
         const double here = trial.connected[option].inverse_efficiency(rounds);
         if (here < least) least = here, pass.light_rounds = rounds, pass.first_times = 1u << option;
     }
-    if (pass.kappa == 0 || !finds_all_unconnected(scene, pass)) return pass;
-    const uint32_t unconnected = trial.unconnected.best_rounds(most);
-    if (trial.unconnected.inverse_efficiency(unconnected) < k_least_gain * least) {
-        pass.kappa = 0;
-        pass.light_rounds = unconnected;
-        pass.eye_path_length += pass.light_path_length + 1;  // paths that were made of two become one
+    if (!finds_all_unconnected(scene, pass)) return pass;
+    if (pass.kappa > 0) {
+        const uint32_t rounds = trial.unconnected.best_rounds(most);
+        const double here = trial.unconnected.inverse_efficiency(rounds);
+        if (here < k_least_gain * least) {
+            least = here, pass.light_rounds = rounds;
+            pass.kappa = 0;
+            pass.eye_path_length += pass.light_path_length + 1;  // paths that were made of two become one
+        }
+    }
+    if (pass.splats && trial.unlit.inverse_efficiency(1) < least && !may_focus(scene)) {
+        pass.eye_path_length = pass.kappa > 0 ? pass.eye_path_length + pass.light_path_length + 1
+                                              : std::max(pass.eye_path_length, pass.light_path_length + 1);
+        pass.kappa = 0, pass.light_rounds = 1;
+        pass.splats = false;
     }
     return pass;
 }

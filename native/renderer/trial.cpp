@@ -5,6 +5,8 @@
 // share) times as large. So what a render without connections would be like follows from one with them, and precisely where
 // it matters: connections find the rare bright paths that such a render would seldom meet.
 //
+// The same goes for a render without any light paths, whose eye paths find what splats would have found too.
+//
 // By the same rule a trial with F times the connections at z_1 tells of every smaller F' what each find would be there: p is less
 // by (1 - F' / F) of the share that those connections have, and of them every F / F'-th is made.
 #include "renderer/trial.h"
@@ -73,17 +75,25 @@ private:
     }
 };
 
-// Something that was found: what it adds to a pixel, and by what share its square would grow without connections.
+// How a render goes without what the trial has: all of it, no connections, or no light paths.
+enum class TrialWay : uint8_t { connected, unconnected, unlit };
+
+// Something that was found: what it adds to a pixel, and by what share its square would grow without connections, and without
+// splats either.
 struct Find {
-    float light = 0, limit = 0, first_share = 0, growth = 0;
+    float light = 0, limit = 0, first_share = 0, growth = 0, growth_unlit = 0;
 
     Find(const PassSettings& pass, const Contribution& c, float scale) {
         const Rgb found = c.value * (c.weight * scale);
         if (!is_finite(found)) return;
         light = average(found), limit = pass.clamp_of(c.s + c.t);
         first_share = c.shares.first;
-        const float left = (1 - c.shares.all) * c.draws;
-        growth = (left > 1 / k_most_growth ? 1 / left : k_most_growth) - 1;
+        growth = growth_of((1 - c.shares.all) * c.draws);
+        growth_unlit = growth_of((1 - c.shares.all - c.shares.splats) * c.draws);
+    }
+    static float growth_of(float left) { return (left > 1 / k_most_growth ? 1 / left : k_most_growth) - 1; }
+    float growth_by(TrialWay way) const {
+        return way == TrialWay::connected ? 0.0f : way == TrialWay::unconnected ? growth : growth_unlit;
     }
     // With `kept` of the connections at z_1.
     float with(float kept) const {
@@ -101,7 +111,7 @@ struct TriedPath {
     float scale;  // light paths of an iteration for each of the trial
     uint32_t number;  // of the round: which connections are kept where not all are
     float light[k_options]{};  // with F = 1, 2, 4, 8 of the connections at z_1
-    double growth = 0;  // of the square, with all
+    double growth = 0, growth_unlit = 0;  // of the square, with all
     uint32_t steps = 1, joined = 0;  // joined: surfaces that connections begin at
     bool first_joined = false;  // z_1 is one
 
@@ -120,6 +130,7 @@ struct TriedPath {
         }
         const auto all = static_cast<double>(find.with(1));
         growth += static_cast<double>(find.growth) * all * all;
+        growth_unlit += static_cast<double>(find.growth_unlit) * all * all;
     }
 };
 
@@ -204,19 +215,21 @@ public:
         for (size_t i = 0; i < level_.size(); ++i) level_[i] = 0.1 + std::max(mean[i], cells.around(i, mean));
     }
 
-    // With F = 2^option, or without connections.
-    Prospect connected(uint32_t option) const { return prospect(option, true); }
-    Prospect unconnected() const { return prospect(k_options - 1, false); }
+    // With F = 2^option, without connections, or without light paths.
+    Prospect connected(uint32_t option) const { return prospect(option, TrialWay::connected); }
+    Prospect unconnected() const { return prospect(k_options - 1, TrialWay::unconnected); }
+    Prospect unlit() const { return prospect(k_options - 1, TrialWay::unlit); }
 
 private:
-    Prospect prospect(uint32_t option, bool connected) const {
+    Prospect prospect(uint32_t option, TrialWay way) const {
+        const bool connected = way == TrialWay::connected;
         const auto count = static_cast<double>(cells_.count());
         Prospect sum;
         std::vector<double> variance(cells_.count());
         double weights = 0;
         for (size_t i = 0; i < cells_.count(); ++i) {
             // Adaptive sampling gives a pixel samples by its deviation, so they cost what they do where there is noise.
-            variance[i] = relative_variance(i, option, connected);
+            variance[i] = relative_variance(i, option, way);
             const double weight = std::sqrt(variance[i]);
             weights += weight, sum.eye_cost += weight * cost(i, connected ? 1u << option : 0);
         }
@@ -235,9 +248,14 @@ private:
         for (const Round& round : rounds_) {
             for (const auto& splat : round.splats) {
                 const double light = std::min(relative(splat, option), most);
-                const double growth = connected ? 1.0 : 1.0 + static_cast<double>(splat.find.growth);
+                const double growth = 1.0 + static_cast<double>(splat.find.growth_by(way));
                 sum.splat_variance += light * light * growth * splats_in_pixel() / (count * k_rounds);
             }
+        }
+        if (way == TrialWay::unlit) {  // the finds of eye paths, of which each belongs to one pixel
+            sum.eye_variance += sum.splat_variance;
+            sum.splat_variance = 0;
+            return sum;
         }
         sum.splat_variance *= squared_filter(pass_);
         sum.light_cost = (light_paths_of_round(pass_) + vertices * k_light_vertex_cost) * splats_in_pixel() / count;
@@ -267,16 +285,17 @@ private:
         }
         return sum / k_rounds;
     }
-    double relative_variance(size_t cell, uint32_t option, bool connected) const {
+    double relative_variance(size_t cell, uint32_t option, TrialWay way) const {
         double sum = 0, squares = 0, growth = 0;
         for (const Round& round : rounds_) {
             const TriedPath& path = round.paths[cell];
             const double found = light(path, option), counted = std::min(found, k_most_times * level_[cell]);
             sum += counted, squares += counted * counted;
-            growth += path.growth * (counted < found ? (counted / found) * (counted / found) : 1.0);
+            const double all = way == TrialWay::unconnected ? path.growth : path.growth_unlit;
+            growth += all * (counted < found ? (counted / found) * (counted / found) : 1.0);
         }
         double variance = (squares - sum * sum / k_rounds) / (k_rounds - 1);
-        if (!connected) variance += growth / k_rounds;
+        if (way != TrialWay::connected) variance += growth / k_rounds;
         return std::max(variance, 0.0) / (level_[cell] * level_[cell]);
     }
 
@@ -303,7 +322,7 @@ Trial try_out(const SceneView& scene, PassSettings pass, ThreadPool& pool) {
     std::vector<Round> rounds(k_rounds);
     pool.run(k_rounds, [&](uint32_t i) { rounds[i] = run_round(scene, pass, cells, i); });
     const Reckoning reckoning(pass, cells, rounds);
-    Trial trial{{}, reckoning.unconnected()};
+    Trial trial{{}, reckoning.unconnected(), reckoning.unlit()};
     for (uint32_t option = 0; option < options; ++option) trial.connected.push_back(reckoning.connected(option));
     return trial;
 }

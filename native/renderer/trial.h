@@ -25,6 +25,7 @@ struct Prospect {
 struct Trial {
     std::vector<Prospect> connected;  // with F = 1, 2, 4 and 8; 1 alone where there are no VLPs
     Prospect unconnected;  // without connections to VLPs
+    Prospect unlit;  // without light paths: eye paths find all light by themselves
 };
 
 // `pass` as for_scene gives it, with R = F = 1 and the balance heuristic. The same on every machine, however many threads.

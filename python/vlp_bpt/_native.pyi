@@ -144,6 +144,10 @@ class Renderer:
     @property
     def first_connections(self) -> int: ...  # C F; 0 where none are made
     @property
+    def portals(self) -> int: ...  # that light from infinity is sent through
+    @property
+    def favoured_lights(self) -> int: ...  # that half of the light paths begin at; 0: none in particular
+    @property
     def paths(self) -> int: ...
     @property
     def ranges(self) -> dict[int, int]: ...  # of iterations done: end by begin

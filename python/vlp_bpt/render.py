@@ -54,10 +54,12 @@ class Statistics:
     """What a render did and took. eye_samples and light_paths: in all; memory: bytes by device and part; dropped:
     non-finite samples left out; light_rounds: how many times as many light paths were joined to the lens as left
     virtual light points; first_connections: how many of these each surface that the camera sees was joined to, 0 where
-    none is joined to any (adaptive sampling chooses both, see `RenderSettings`); eye_form: of the eye pass, "paths" or
-    "wavefront" (native/backend/eye_form.h); build_seconds: uploading the scene and building its hierarchy, as far as it
-    changed; denoise_seconds: of denoising the last picture, not part of seconds; noise: of the picture before
-    denoising, as `vlp_bpt.noise` measures it, None without `noise_threshold` and before it was told."""
+    none is joined to any (adaptive sampling chooses both, see `RenderSettings`); portals: places that light of the sky
+    and of suns is sent through; favoured_lights: those that half of the light paths begin at, 0 where none stands out
+    (native/renderer/light_guide.h); eye_form: of the eye pass, "paths" or "wavefront" (native/backend/eye_form.h);
+    build_seconds: uploading the scene and building its hierarchy, as far as it changed; denoise_seconds: of denoising
+    the last picture, not part of seconds; noise: of the picture before denoising, as `vlp_bpt.noise` measures it, None
+    without `noise_threshold` and before it was told."""
 
     iterations: int
     seconds: float
@@ -69,6 +71,8 @@ class Statistics:
     memory: dict[str, dict[str, int]]
     light_rounds: int = 1
     first_connections: int = 1
+    portals: int = 0
+    favoured_lights: int = 0
     eye_form: str = "paths"
     denoise_seconds: float = 0.0
     noise: float | None = None
@@ -194,6 +198,8 @@ class Renderer:
             memory=self.memory,
             light_rounds=int(self._native.light_rounds),
             first_connections=int(self._native.first_connections),
+            portals=int(self._native.portals),
+            favoured_lights=int(self._native.favoured_lights),
             eye_form=self._native.eye_form,
             denoise_seconds=self._denoise_seconds,
             noise=self._noise.noise,
@@ -339,6 +345,8 @@ class Renderer:
             "eye_form": statistics["eye_form"],
             "light_rounds": statistics["light_rounds"],
             "first_connections": statistics["first_connections"],
+            "portals": statistics["portals"],
+            "favoured_lights": statistics["favoured_lights"],
             "film": {"width": self.film.width, "height": self.film.height, "window": list(self.film.render_window)},
             "statistics": {name: statistics[name] for name in ("eye_samples", "light_paths", "dropped")},
         } | ({} if self._noise.noise is None else {"noise": self._noise.noise})

@@ -219,6 +219,14 @@ def test_noise_is_shown_where_it_is_known() -> None:
     assert "Noise" not in figures.status(taken, Progress(32, 64, 0.5, 1.0, 1.0, True))
 
 
+@pytest.mark.parametrize(
+    "portals, lights, text", [(0, 0, None), (1, 0, "1 window"), (0, 2, "2 lights"), (2, 1, "2 windows, 1 light")]
+)
+def test_it_shows_where_light_is_sent(portals: int, lights: int, text: str | None) -> None:
+    taken = Statistics(64, 1.0, 0.1, 1000, 500, 42, 0, {}, portals=portals, favoured_lights=lights)
+    assert dict(figures.lines(taken, 2.0, (0.0, 0.0), [])).get("Light Sent To") == text
+
+
 @pytest.mark.parametrize("persistent", [False, True])
 def test_animations(tmp_path: Path, fake: list[FakeRenderer], persistent: bool, watch: Watch) -> None:
     scenes.camera()

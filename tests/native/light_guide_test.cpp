@@ -11,16 +11,6 @@ namespace {
 
 constexpr uint32_t k_size = 64;
 
-std::unique_ptr<Scene> seen(const std::function<void(Scene&)>& fill, const Camera& camera) {
-    auto scene = std::make_unique<Scene>();
-    add_materials(*scene);
-    fill(*scene);
-    scene->set_camera(camera);
-    scene->set_film(k_size, k_size, {0, 0, k_size, k_size}, false);
-    scene->build(1);
-    return scene;
-}
-
 PassSettings asked() { return balanced(k_size * k_size / 8); }
 
 LightGuide learnt(const Scene& scene, PassSettings pass = asked(), unsigned threads = 1) {
@@ -52,7 +42,7 @@ std::unique_ptr<Scene> room_in_a_wide_land(const std::function<void(Scene&)>& ad
             add_surface(scene, quad({-40, -40, -1}, {40, -40, -1}, {40, 40, -1}, {-40, 40, -1}), k_red);
             add_lights(scene);
         },
-        looking({-1.5f, -1.5f, 1.5f}, {-0.5f, 2, 0.5f}, 0.5f));
+        looking({-1.5f, -1.5f, 1.5f}, {-0.5f, 2, 0.5f}, 0.5f), k_size);
 }
 
 // The part of `n` rays through the middle of the window, from the side that light comes from, that lie in a portal.
@@ -107,7 +97,7 @@ TEST(LightGuide, HasNoPortalsWhereLightComesFromEverywhere) {
             add_sphere(s, {0, 0, 0}, 1, k_white);
             s.set_world({1, 1, 1});
         },
-        looking({0, -3, 0}, {0, 0, 0}, 0.2f));
+        looking({0, -3, 0}, {0, 0, 0}, 0.2f), k_size);
     EXPECT_EQ(learnt(*scene).portals.count, 0u);
 }
 
@@ -123,7 +113,7 @@ TEST(LightGuide, FavoursTheLampThatIsSeen) {
                 s.add_lamp(make_point({x, 0, 2}, {50, 50, 50}, 0.1f).value(), 0);
             }
         },
-        looking({1, -3, 1.5f}, {0, 2, 0}, 0.3f));
+        looking({1, -3, 1.5f}, {0, 2, 0}, 0.3f), k_size);
     const LightGuide guide = learnt(*scene);
     ASSERT_GT(guide.favoured.count, 0u);
     EXPECT_EQ(guide.favoured.light[0], 4u);
@@ -151,9 +141,9 @@ TEST(LightGuide, IsNotForThePapersMode) {
 }
 
 TEST(LightGuide, OfNothing) {
-    const auto dark = seen([](Scene& s) { add_floor(s, 1); }, looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f));
+    const auto dark = seen([](Scene& s) { add_floor(s, 1); }, looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f), k_size);
     EXPECT_EQ(learnt(*dark).portals.count + learnt(*dark).favoured.count, 0u);
-    const auto empty = seen([](Scene& s) { s.set_world({1, 1, 1}); }, looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f));
+    const auto empty = seen([](Scene& s) { s.set_world({1, 1, 1}); }, looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f), k_size);
     EXPECT_EQ(learnt(*empty).portals.count, 0u);
 }
 

@@ -190,6 +190,17 @@ inline std::vector<NamedLight> every_light() {
     return lights;
 }
 
+// What `fill` adds to a scene with the materials above, seen by a camera of size x size pixels.
+inline std::unique_ptr<Scene> seen(const std::function<void(Scene&)>& fill, const Camera& camera, uint32_t size) {
+    auto scene = std::make_unique<Scene>();
+    add_materials(*scene);
+    fill(*scene);
+    scene->set_camera(camera);
+    scene->set_film(size, size, {0, 0, size, size}, false);
+    scene->build(1);
+    return scene;
+}
+
 // A room with every kind of surface, lit by `add_lights`.
 inline std::unique_ptr<Scene> crowded_room(const std::function<void(Scene&)>& add_lights, uint32_t pixels,
                                            CameraKind camera = CameraKind::perspective) {

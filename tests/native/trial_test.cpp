@@ -8,16 +8,6 @@ namespace {
 
 constexpr uint32_t k_size = 128;
 
-std::unique_ptr<Scene> seen(const std::function<void(Scene&)>& fill, const Camera& camera, uint32_t size = k_size) {
-    auto scene = std::make_unique<Scene>();
-    add_materials(*scene);
-    fill(*scene);
-    scene->set_camera(camera);
-    scene->set_film(size, size, {0, 0, size, size}, false);
-    scene->build(1);
-    return scene;
-}
-
 void add_floor(Scene& scene) { add_surface(scene, quad({-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}), k_white); }
 
 void add_area_lamp(Scene& scene, const Affine& placement) {
@@ -47,7 +37,7 @@ std::unique_ptr<Scene> indirect() {
                         k_white);
             add_area_lamp(scene, placed_at({0, 0, 2.5f}, {0.5f, 0.5f, -1}));
         },
-        looking({0, -5, 1.5f}, {0, 0, 1}, 0.4f));
+        looking({0, -5, 1.5f}, {0, 0, 1}, 0.4f), k_size);
 }
 
 // A small lamp over a glass ball.
@@ -59,7 +49,7 @@ std::unique_ptr<Scene> caustic() {
             add_sphere(scene, {0, 0, 0.7f}, 0.5f, static_cast<int32_t>(scene.add_material(lobes, {})));
             add_area_lamp(scene, placed_at({0.6f, 0, 4}, {0.1f, 0.1f, 1}));
         },
-        looking({0, -4, 3}, {0, 0, 0.3f}, 0.5f));
+        looking({0, -4, 3}, {0, 0, 0.3f}, 0.5f), k_size);
 }
 
 PassSettings adaptive() {
@@ -85,7 +75,8 @@ TEST(Trial, SaysTheSameOnAnyThreads) {
     const Trial one = tried(*scene, uniform(), 1), three = tried(*scene, uniform(), 3);
     for (const auto& [a, b] : {std::pair{one.connected[0], three.connected[0]},
                                {one.connected[3], three.connected[3]},
-                               {one.unconnected, three.unconnected}}) {
+                               {one.unconnected, three.unconnected},
+                               {one.unlit, three.unlit}}) {
         EXPECT_EQ(a.eye_variance, b.eye_variance);
         EXPECT_EQ(a.splat_variance, b.splat_variance);
         EXPECT_EQ(a.eye_cost, b.eye_cost);
@@ -110,6 +101,22 @@ TEST(Trial, PredictsARenderWithoutConnections) {
     const Trial trial = tried(*indirect(), uniform());
     EXPECT_GT(trial.unconnected.eye_variance, 2 * trial.connected.front().eye_variance);
     EXPECT_LT(trial.unconnected.eye_cost, 0.8 * trial.connected.front().eye_cost);
+}
+
+// And without light paths.
+TEST(Trial, PredictsARenderWithoutLightPaths) {
+    for (const auto& scene : {outdoors(), indirect()}) {
+        PassSettings without = uniform();
+        without.vlp_connections = 0, without.splats = false;
+        const Prospect predicted = tried(*scene, uniform()).unlit, found = tried(*scene, without).connected.front();
+        EXPECT_EQ(predicted.splat_variance, 0);
+        EXPECT_EQ(predicted.light_cost, 0);
+        EXPECT_GT(predicted.eye_variance, 0.5 * found.eye_variance);
+        EXPECT_LT(predicted.eye_variance, 2.5 * found.eye_variance) << "of splats the mean of variances counts";
+        EXPECT_NEAR(predicted.eye_cost, found.eye_cost, 0.2 * found.eye_cost);
+    }
+    const Trial trial = tried(*caustic(), uniform());
+    EXPECT_GT(trial.unlit.eye_variance, 2 * trial.unconnected.eye_variance);
 }
 
 // The moments of the pixels over 16 iterations.
@@ -205,7 +212,10 @@ TEST(ForScene, ChoosesWhatPays) {
     const PassSettings open = for_scene(outdoors()->view(), adaptive());
     EXPECT_EQ(open.kappa, 0);
     EXPECT_EQ(open.eye_path_length, 16u + 12 + 1) << "paths of as many vertices as connections could make";
+    EXPECT_FALSE(open.splats) << "nor do splats pay where nothing focuses light";
+    EXPECT_TRUE(for_scene(caustic()->view(), adaptive()).splats);
     const PassSettings room = for_scene(indirect()->view(), adaptive());
+    EXPECT_TRUE(room.splats);
     EXPECT_GT(room.kappa, 0);
     EXPECT_EQ(room.light_rounds, 1u);
     EXPECT_GT(room.first_times, 2u);
@@ -240,7 +250,7 @@ TEST(ForScene, KeepsConnectionsThatNothingReplaces) {
             add_floor(scene);
             scene.add_lamp(make_sun(aslant({1, 1, 3}), {3, 3, 3}, 0).value(), 0);
         },
-        looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f));
+        looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f), k_size);
     EXPECT_GT(for_scene(sharp->view(), adaptive()).kappa, 0);
 }
 
@@ -251,7 +261,7 @@ TEST(ForScene, TakesPicturesOfAnySize) {
         pass.light_paths = 1;
         EXPECT_GE(for_scene(scene->view(), pass).light_rounds, 1u);
     }
-    const auto dark = seen([](Scene& scene) { add_floor(scene); }, looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f));
+    const auto dark = seen([](Scene& scene) { add_floor(scene); }, looking({0, -5, 3}, {0, 0, 0.3f}, 0.5f), k_size);
     EXPECT_EQ(for_scene(dark->view(), adaptive()).light_rounds, 1u);
 }
 

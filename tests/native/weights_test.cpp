@@ -81,16 +81,18 @@ void compare_weights(const SceneView& scene, const PassSettings& pass, uint32_t 
         ASSERT_LE(c.s, pass.light_path_length + 1);
         ASSERT_LE(c.t, pass.eye_path_length + 1);
         const std::vector<double> w = reference::weights(scene, pass, path);
-        double sum = 0, connections = 0, first = 0;
+        double sum = 0, connections = 0, first = 0, splats = 0;
         for (size_t s = 0; s < w.size(); ++s) {
             sum += w[s];
             if (s >= 2 && s + 2 <= path.size()) connections += w[s];
             if (s >= 2 && s + 2 == path.size()) first += w[s];
+            if (s >= 2 && s + 1 == path.size()) splats += w[s];
         }
         ASSERT_NEAR(sum, 1, 1e-6);
         const double error =
             std::max({std::fabs(c.weight / w[c.s] - 1), std::fabs(static_cast<double>(c.shares.all) - connections),
-                      std::fabs(static_cast<double>(c.shares.first) - first)});
+                      std::fabs(static_cast<double>(c.shares.first) - first),
+                      std::fabs(static_cast<double>(c.shares.splats) - splats)});
         Errors& of_strategy = (c.t == 1 ? errors.splats : errors.joined)[c.s];
         if (!well_conditioned(path)) {
             of_strategy.rest.push_back(error);

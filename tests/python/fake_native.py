@@ -51,6 +51,7 @@ class FakeRenderer:
         self.resting = True
         self.eye_form = "paths"
         self.light_rounds, self.first_connections = 1, 1
+        self.portals, self.favoured_lights = 0, 0
 
     @property
     def ranges(self) -> dict[int, int]:

@@ -186,8 +186,17 @@ def test_with_more_connections_it_is_the_same_picture() -> None:
     assert with_them.var(axis=0).mean() < 0.8 * without.var(axis=0).mean()
 
 
-def test_without_connections_it_is_the_same_picture() -> None:
-    """Eye paths that go on alone find what they found joined to virtual light points."""
+def test_splats_stay_where_something_may_focus_light() -> None:
+    scene = outdoors()
+    scene.materials.append(Material("polished", (Lobe(LobeKind.REFLECTION, (0.5, 0.5, 0.5), 0.2),)))
+    scene.instances[1].materials = (1,)
+    taken = rendered(1, scene, light_path_length=12, eye_path_length=16).statistics
+    assert not taken.first_connections
+    assert taken.light_paths > 0
+
+
+def test_without_light_paths_it_is_the_same_picture() -> None:
+    """Eye paths that go on alone find what they found joined to virtual light points and splats."""
     options = {"light_path_length": 6, "eye_path_length": 8, "light_paths": 500}
     scene = outdoors()
     scene.film = Film(16, 16)
@@ -197,5 +206,6 @@ def test_without_connections_it_is_the_same_picture() -> None:
         )
         for first, kind in ((0, {}), (1000, {"adaptive": False}))
     )
-    assert not rendered(1, scene, **options).statistics.first_connections
-    assert_same_mean(blocks(with_them, 2), blocks(without, 2), "without connections")
+    taken = rendered(1, scene, **options).statistics
+    assert (taken.first_connections, taken.light_paths) == (0, 0)
+    assert_same_mean(blocks(with_them, 2), blocks(without, 2), "without light paths")

@@ -16,8 +16,8 @@ import pytest
 from small_scenes import room
 
 from vlp_bpt import Error, RenderSettings
-from vlp_bpt.bench import agreement, claims, growth, main, peers, peers_report, plots, sweep
-from vlp_bpt.bench.contestants import Contestant, Ours, race
+from vlp_bpt.bench import agreement, claims, contestants, growth, main, peers, peers_report, plots, sweep
+from vlp_bpt.bench.contestants import Contestant, Mitsuba, Ours, race
 from vlp_bpt.bench.measure import Point, add_point, ladder, seconds_to, slope, ssim_at
 from vlp_bpt.bench.remote import Remote, State
 from vlp_bpt.snapshot import Snapshot, save_snapshot
@@ -193,6 +193,28 @@ def test_race_goes_by_turns_to_the_same_instants() -> None:
 
 
 # Peers
+
+
+@pytest.mark.parametrize("overhead, pace", [(2.0, 0.04), (0.001, 0.1)])
+def test_mitsuba_pays_for_a_launch_once(overhead: float, pace: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In slices it makes about as many samples as in one go, whatever a launch costs without samples."""
+    clock = SimpleNamespace(now=0.0)
+    noise = np.random.default_rng(1)
+
+    def launch(_loaded: Any, samples: int, _seed: int) -> np.ndarray:
+        clock.now += (overhead + pace * samples) * noise.uniform(0.95, 1.05)
+        return np.ones((512, 512, 3))
+
+    monkeypatch.setattr(contestants.time, "perf_counter", lambda: clock.now)
+    monkeypatch.setattr(contestants.mitsuba, "load", lambda *_: None)
+    monkeypatch.setattr(contestants.mitsuba, "launch", launch)
+    mitsuba = Mitsuba("Mitsuba", SimpleNamespace(film=SimpleNamespace(width=512, height=512)), 64)  # type: ignore[arg-type]
+    mitsuba.prepare()
+    race([mitsuba], peers.instants(15.0), lambda *_: None)
+    assert mitsuba.seconds == pytest.approx(15.0, rel=0.1)
+    in_one_go = (mitsuba.seconds - overhead) / pace * 512 * 512
+    assert mitsuba.eye_samples == pytest.approx(in_one_go, rel=0.15)
+    assert mitsuba.picture() == pytest.approx(1.0)
 
 
 def outcome(name: str, **values: Any) -> Any:

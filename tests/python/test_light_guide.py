@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scenes_for_tests import Builder, assert_same_mean, batches, blocks, grey, looking, settings, transform
 
+from vlp_bpt import Renderer, RenderSettings
 from vlp_bpt.scene import AreaLight, Mesh, Scene, SunLight, World
+from vlp_bpt.settings import Mode
 
 
 def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> Mesh:
@@ -67,6 +69,18 @@ def among_lamps() -> Scene:
     for i in range(6):
         scene.lights.append(AreaLight(f"lamp {i}", transform((4.0 + i, 8.0, 3.0)), (30.0, 30.0, 30.0), (0.5, 0.5)))
     return scene
+
+
+@pytest.mark.parametrize("make, portals, lights", [(under_sky_and_sun, True, False), (among_lamps, False, True)])
+def test_what_it_found_is_told(make: Callable[[], Scene], portals: bool, lights: bool) -> None:
+    scene = make()
+    scene.camera = CAMERA
+    renderer = Renderer(scene, RenderSettings(samples=1))
+    told, taken = renderer.metadata(), renderer.statistics
+    assert (taken.portals > 0, taken.favoured_lights > 0) == (portals, lights)
+    assert (told["portals"], told["favoured_lights"]) == (taken.portals, taken.favoured_lights)
+    same = Renderer(scene, RenderSettings(mode=Mode.PAPER, samples=1)).statistics
+    assert (same.portals, same.favoured_lights) == (0, 0), "PAPER weighs all strategies the same"
 
 
 @pytest.mark.parametrize("make", [under_sky_and_sun, under_sky, among_lamps])

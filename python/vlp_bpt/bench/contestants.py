@@ -6,7 +6,6 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from vlp_bpt.settings import RenderSettings
 from . import cycles, luxcore, mitsuba
 
 Pixels = NDArray[np.float64]
-SPARED = 4  # times what a launch of Mitsuba's costs without samples: no slice is shorter
 CYCLES_SEQUENCE = 1 << 16  # samples of the one sequence that all slices belong to
 
 
@@ -179,7 +177,8 @@ class Cycles(Contestant):
 
 @dataclass
 class Mitsuba(Contestant):
-    """Mitsuba's path tracer: launches of as many samples as the pace so far says."""
+    """Mitsuba's path tracer: launches of as many samples as the pace so far says. What a launch costs without samples
+    counts once, as whoever renders in one go pays it."""
 
     scene: Scene
     scatterings: int
@@ -197,31 +196,45 @@ class Mitsuba(Contestant):
 
     @property
     def shortest(self) -> float:
-        return SPARED * self._overhead
+        return self._overhead
 
     def prepare(self) -> None:
         self._loaded = mitsuba.load(self.scene, self.scatterings)
         mitsuba.launch(self._loaded, 1, 0)  # compiles
-        one, some = (_seconds(partial(mitsuba.launch, self._loaded, samples, 0)) for samples in (1, 5))
-        self._pace = max((some - one) / 4, 1e-4)
+        one = min(self._timed(1) for _ in range(2))
+        samples = 4
+        self._timed(samples)  # compiles what more than one a pixel takes
+        while (took := self._timed(samples)) < 2 * one and 4 * samples <= self._most:
+            samples *= 4
+        self._pace = max((took - one) / (samples - 1), 1e-4)
         self._overhead = max(one - self._pace, 0.0)
 
     def run(self, seconds: float) -> None:
-        began, spent, made = time.perf_counter(), 0.0, 0
-        pixels = self.scene.film.width * self.scene.film.height
-        most = max(1, mitsuba.PASS // pixels)
-        while not made or seconds - spent > self._overhead + 0.5 * self._pace:
-            samples = max(1, min(most, round((seconds - spent - self._overhead) / self._pace)))
-            self._launches += 1
-            part = samples * mitsuba.launch(self._loaded, samples, (self.seed << 20) + self._launches)
+        spent, made = 0.0, 0
+        while not made or seconds - spent > max(0.05 * seconds, 0.5 * self._pace):
+            left = seconds - spent - (self._overhead if self._launches == 0 else 0.0)
+            samples = max(1, min(self._most, round(left / self._pace)))
+            began = time.perf_counter()
+            part = samples * mitsuba.launch(self._loaded, samples, (self.seed << 20) + self._launches + 1)
+            took = time.perf_counter() - began
             self._sum = part if self._sum is None else self._sum + part
+            spent += took if self._launches == 0 else max(took - self._overhead, 0.5 * samples * self._pace)
             made += samples
-            took = time.perf_counter() - began - spent
-            spent += took
+            self._launches += 1
             if took > 2 * self._overhead:
-                self._pace = (took - self._overhead) / samples
+                self._pace = max((took - self._overhead) / samples, 1e-4)
         self._samples += made
-        self._count(spent, made * pixels)
+        self._count(spent, made * self.scene.film.width * self.scene.film.height)
+
+    @property
+    def _most(self) -> int:
+        """Samples a pixel of the largest launch."""
+        return max(1, mitsuba.PASS // (self.scene.film.width * self.scene.film.height))
+
+    def _timed(self, samples: int) -> float:
+        began = time.perf_counter()
+        mitsuba.launch(self._loaded, samples, 0)
+        return time.perf_counter() - began
 
     def picture(self) -> Pixels:
         if self._sum is None:
@@ -268,12 +281,6 @@ class LuxCore(Contestant):
 
     def picture(self) -> Pixels:
         return np.asarray(self._session.picture(), np.float64)
-
-
-def _seconds(work: Callable[[], object]) -> float:
-    began = time.perf_counter()
-    work()
-    return time.perf_counter() - began
 
 
 def race(

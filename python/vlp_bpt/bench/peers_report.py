@@ -107,12 +107,15 @@ def settings() -> dict[str, str]:
         "VLP-BPT": f"BALANCED: L = {balanced.light_path_length}, K = {balanced.eye_path_length}, roulette, splats, "
         f"adaptive sampling, one VLP of {balanced.vlp_candidates} a hit, a light path for "
         f"{balanced.pixels_per_light_path} pixels; where a trial of the scene finds that it pays, up to eight "
-        "times as many for caustics, up to eight VLPs where the camera looks, or none; Sobol sequences.",
+        "times as many for caustics, up to eight VLPs where the camera looks, or none, or no light paths; where a "
+        "pilot finds that it pays, light paths go through windows and begin at the lights that the picture shows; Sobol "
+        "sequences.",
         f"Cycles{_version('bpy')}": "path tracing on the CPU, multiple importance sampling; light tree, adaptive "
         "sampling, path guiding, clamps and denoiser off; its Sobol sequences. Spheres are smooth meshes, as its point "
         "clouds are wrong inside glass.",
         f"Mitsuba{_version('mitsuba')}": f"{mitsuba.variant()}, `path`, or `volpath` where lamps have to let light "
-        "through; independent sampler, launches of up to 67 M samples.",
+        "through; independent sampler, launches of up to 67 M samples, of which the first alone pays for what a launch "
+        "costs without samples.",
         f"LuxCore PATHCPU{_version('pyluxcore')}": "Sobol sampler, not adaptive; its own roulette.",
         "LuxCore BIDIRCPU": f"as PATHCPU; walks of up to {LUXCORE_DEPTH} hits from either side without roulette, "
         "as with it the picture is too bright.",
