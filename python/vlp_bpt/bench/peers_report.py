@@ -108,8 +108,8 @@ def settings() -> dict[str, str]:
         f"adaptive sampling, one VLP of {balanced.vlp_candidates} a hit, a light path for "
         f"{balanced.pixels_per_light_path} pixels; where a trial of the scene finds that it pays, up to eight "
         "times as many for caustics, up to eight VLPs where the camera looks, or none, or no light paths; where a "
-        "pilot finds that it pays, light paths go through windows and begin at the lights that the picture shows; Sobol "
-        "sequences.",
+        "pilot finds that it pays, light paths go through windows and begin at the lights that the picture shows; "
+        "Sobol sequences.",
         f"Cycles{_version('bpy')}": "path tracing on the CPU, multiple importance sampling; light tree, adaptive "
         "sampling, path guiding, clamps and denoiser off; its Sobol sequences. Spheres are smooth meshes, as its point "
         "clouds are wrong inside glass.",
