@@ -225,18 +225,8 @@ private:
         const bool connected = way == TrialWay::connected;
         const auto count = static_cast<double>(cells_.count());
         Prospect sum;
-        std::vector<double> variance(cells_.count());
-        double weights = 0;
-        for (size_t i = 0; i < cells_.count(); ++i) {
-            // Adaptive sampling gives a pixel samples by its deviation, so they cost what they do where there is noise.
-            variance[i] = relative_variance(i, option, way);
-            const double weight = std::sqrt(variance[i]);
-            weights += weight, sum.eye_cost += weight * cost(i, connected ? 1u << option : 0);
-        }
-        sum.eye_cost = weights > 0 ? sum.eye_cost / weights : 1;
-        // And what counts is the mean of deviations. Eight rounds say little of one pixel's.
-        for (size_t i = 0; i < cells_.count(); ++i) sum.eye_variance += std::sqrt(cells_.around(i, variance)) / count;
-        sum.eye_variance *= sum.eye_variance;
+        // Squares of what falls on the pixels of each cell in an iteration.
+        std::vector<double> of_splats(cells_.count());
         double vertices = 0, splats = 0, relative_light = 0;
         for (const Round& round : rounds_) {
             vertices += round.light_vertices / static_cast<double>(k_rounds);
@@ -249,14 +239,25 @@ private:
             for (const auto& splat : round.splats) {
                 const double light = std::min(relative(splat, option), most);
                 const double growth = 1.0 + static_cast<double>(splat.find.growth_by(way));
-                sum.splat_variance += light * light * growth * splats_in_pixel() / (count * k_rounds);
+                of_splats[splat.cell] += light * light * growth * splats_in_pixel() / k_rounds;
             }
         }
-        if (way == TrialWay::unlit) {  // the finds of eye paths, of which each belongs to one pixel
-            sum.eye_variance += sum.splat_variance;
-            sum.splat_variance = 0;
-            return sum;
+        const bool unlit = way == TrialWay::unlit;  // eye paths find this light
+        std::vector<double> variance(cells_.count());
+        double weights = 0;
+        for (size_t i = 0; i < cells_.count(); ++i) {
+            // Adaptive sampling gives a pixel samples by its deviation, so they cost what they do where there is noise.
+            variance[i] = relative_variance(i, option, way);
+            if (unlit) variance[i] += of_splats[i];
+            const double weight = std::sqrt(variance[i]);
+            weights += weight, sum.eye_cost += weight * cost(i, connected ? 1u << option : 0);
         }
+        sum.eye_cost = weights > 0 ? sum.eye_cost / weights : 1;
+        // And what counts is the mean of deviations. Eight rounds say little of one pixel's.
+        for (size_t i = 0; i < cells_.count(); ++i) sum.eye_variance += std::sqrt(cells_.around(i, variance)) / count;
+        sum.eye_variance *= sum.eye_variance;
+        if (unlit) return sum;
+        for (const double squares : of_splats) sum.splat_variance += squares / count;
         sum.splat_variance *= squared_filter(pass_);
         sum.light_cost = (light_paths_of_round(pass_) + vertices * k_light_vertex_cost) * splats_in_pixel() / count;
         return sum;
