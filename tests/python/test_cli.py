@@ -259,7 +259,7 @@ def test_interrupting_keeps_the_picture(folder: Path) -> None:
 
 
 def test_interrupting_before_the_first_picture_leaves_none(folder: Path) -> None:
-    slow = ("light_samples=1024", "vlp_connections=1024", "light_paths=2000000")
+    slow = ("light_samples=1024", "vlp_connections=1024", "light_paths=2000000", "adaptive=off")
     settings = [word for value in slow for word in ("--set", value)]
     terminal = OnTerminal(folder, "render", "room.vlp.npz", "-o", "a.exr", *settings)
     terminal.read_until(b" 0/6 iterations")

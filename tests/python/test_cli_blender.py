@@ -139,7 +139,7 @@ def test_failures_are_said_in_one_line(folder: Path, arguments: tuple[str, ...],
 
 
 def test_interrupting_before_the_first_picture_leaves_none(folder: Path) -> None:
-    slow = ("light_samples=1024", "vlp_connections=1024", "light_paths=2000000")
+    slow = ("light_samples=1024", "vlp_connections=1024", "light_paths=2000000", "adaptive=off")
     settings = [word for value in slow for word in ("--set", value)]
     terminal = OnTerminal(folder, "render", "box.blend", "-o", "none.exr", "--samples", "6", *settings)
     terminal.read_until(b" 0/6 iterations")
