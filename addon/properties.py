@@ -127,8 +127,8 @@ class VLP_BPT_SceneSettings(bpy.types.PropertyGroup):
     adaptive: bpy.props.BoolProperty(
         name="Adaptive Sampling",
         description="Spend more samples where the picture is noisy and fewer where it is clean, more light paths where "
-        "there are caustics, more virtual light points in rooms lit indirectly, and none where they bring less than "
-        "they take. The picture stays right, and the number of samples is that of a pixel on average",
+        "there are caustics, more virtual light points in rooms lit indirectly, and none of either where they bring "
+        "less than they take. The picture stays right, and the number of samples is that of a pixel on average",
         default=_DEFAULTS["adaptive"],
     )
     light_path_length: bpy.props.IntProperty(

@@ -45,7 +45,7 @@ VLP_HD inline float splat_count(const PassSettings& pass, uint32_t s) {
 // What connections to VLPs have of all strategies that could have made a path, what those at z_1 alone have, and what joining
 // light vertices to the lens has.
 struct ConnectionShares {
-    float all = 0, first = 0, splats = 0;
+    float all = 0, first = 0, splats = 0;  // `all` counts no splats
 };
 
 // Sums what the other strategies have relative to the one at hand.

@@ -110,20 +110,18 @@ PassSettings as_it_pays(const SceneView& scene, PassSettings pass, ThreadPool& p
         if (here < least) least = here, pass.light_rounds = rounds, pass.first_times = 1u << option;
     }
     if (!finds_all_unconnected(scene, pass)) return pass;
-    if (pass.kappa > 0) {
-        const uint32_t rounds = trial.unconnected.best_rounds(most);
-        const double here = trial.unconnected.inverse_efficiency(rounds);
-        if (here < k_least_gain * least) {
-            least = here, pass.light_rounds = rounds;
-            pass.kappa = 0;
-            pass.eye_path_length += pass.light_path_length + 1;  // paths that were made of two become one
-        }
+    // Hits of an eye path that is as long as those that are made of two, or as a splat's.
+    const uint32_t alone = pass.kappa > 0 ? pass.eye_path_length + pass.light_path_length + 1
+                                          : std::max(pass.eye_path_length, pass.light_path_length + 1);
+    const uint32_t rounds = trial.unconnected.best_rounds(most);
+    const double unconnected = trial.unconnected.inverse_efficiency(rounds);
+    if (pass.kappa > 0 && unconnected < k_least_gain * least) {
+        least = unconnected, pass.light_rounds = rounds;
+        pass.kappa = 0, pass.eye_path_length = alone;
     }
     if (pass.splats && trial.unlit.inverse_efficiency(1) < least && !may_focus(scene)) {
-        pass.eye_path_length = pass.kappa > 0 ? pass.eye_path_length + pass.light_path_length + 1
-                                              : std::max(pass.eye_path_length, pass.light_path_length + 1);
-        pass.kappa = 0, pass.light_rounds = 1;
-        pass.splats = false;
+        pass.splats = false, pass.light_rounds = 1;
+        pass.kappa = 0, pass.eye_path_length = alone;
     }
     return pass;
 }
@@ -142,8 +140,14 @@ PassSettings for_scene(const SceneView& scene_alone, PassSettings pass, unsigned
         if (pilot.vlps_per_path > 0) pass.kappa = static_cast<float>(pass.vlp_candidates) / pilot.vlps_per_path;
         pass.vlp_grid = pilot.grid;
     }
-    if (!pass.adaptive || !pass.traces_light() || pass.weighting != Weighting::balance) return pass;
-    return as_it_pays(scene, pass, pool);
+    if (pass.adaptive && pass.traces_light() && pass.weighting == Weighting::balance)
+        pass = as_it_pays(scene, pass, pool);
+    if (!pass.traces_light()) {  // what is for light paths alone guides nothing
+        const LightGuide none;
+        pass.light_guide.favoured = none.favoured;
+        if (!pass.light_guide.portals.in_next_event) pass.light_guide.portals = none.portals;
+    }
+    return pass;
 }
 
 }  // namespace vlp

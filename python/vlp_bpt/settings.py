@@ -126,8 +126,8 @@ class RenderSettings:
     all of them go on up to L and K. adaptive: from the fifth iteration on, iterations take more samples in pixels that
     are noisier and fewer in others, one a pixel on average; without bias (native/film/sample_rates.h). And
     where a trial of the scene finds that it pays (native/renderer/trial.h), up to eight times `light_paths` are joined
-    to the lens, and up to eight times `vlp_connections` are made at the surface that the camera sees, or none anywhere;
-    eye paths may then be as long as both kinds together.
+    to the lens, and up to eight times `vlp_connections` are made at the surface that the camera sees, or none anywhere,
+    and no light paths at all; eye paths may then be as long as both kinds together.
     hits: eye paths that meet a light count.
     clamp_direct, clamp_indirect: the most that one find of light after at most one surface, or after more, may add to
     a pixel (mean of its channels); 0: no limit. Clamping removes bright specks and the light in them: it is a bias.

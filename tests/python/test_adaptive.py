@@ -5,6 +5,7 @@ Means are compared by t-tests with Sidak's correction at a false-alarm rate of 1
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -186,19 +187,19 @@ def test_with_more_connections_it_is_the_same_picture() -> None:
     assert with_them.var(axis=0).mean() < 0.8 * without.var(axis=0).mean()
 
 
-def test_splats_stay_where_something_may_focus_light() -> None:
+def polished_outdoors() -> Scene:
     scene = outdoors()
     scene.materials.append(Material("polished", (Lobe(LobeKind.REFLECTION, (0.5, 0.5, 0.5), 0.2),)))
     scene.instances[1].materials = (1,)
-    taken = rendered(1, scene, light_path_length=12, eye_path_length=16).statistics
-    assert not taken.first_connections
-    assert taken.light_paths > 0
+    return scene
 
 
-def test_without_light_paths_it_is_the_same_picture() -> None:
-    """Eye paths that go on alone find what they found joined to virtual light points and splats."""
+@pytest.mark.parametrize("make, splats", [(outdoors, False), (polished_outdoors, True)])
+def test_without_connections_it_is_the_same_picture(make: Callable[[], Scene], splats: bool) -> None:
+    """Eye paths that go on alone find what they found joined to virtual light points and, where nothing focuses light,
+    what splats found."""
     options = {"light_path_length": 6, "eye_path_length": 8, "light_paths": 500}
-    scene = outdoors()
+    scene = make()
     scene.film = Film(16, 16)
     with_them, without = (
         np.array(
@@ -207,5 +208,5 @@ def test_without_light_paths_it_is_the_same_picture() -> None:
         for first, kind in ((0, {}), (1000, {"adaptive": False}))
     )
     taken = rendered(1, scene, **options).statistics
-    assert (taken.first_connections, taken.light_paths) == (0, 0)
-    assert_same_mean(blocks(with_them, 2), blocks(without, 2), "without light paths")
+    assert (taken.first_connections, taken.light_paths > 0) == (0, splats)
+    assert_same_mean(blocks(with_them, 2), blocks(without, 2), make.__name__)

@@ -208,7 +208,7 @@ def test_mitsuba_pays_for_a_launch_once(overhead: float, pace: float, monkeypatc
     monkeypatch.setattr(contestants.time, "perf_counter", lambda: clock.now)
     monkeypatch.setattr(contestants.mitsuba, "load", lambda *_: None)
     monkeypatch.setattr(contestants.mitsuba, "launch", launch)
-    mitsuba = Mitsuba("Mitsuba", SimpleNamespace(film=SimpleNamespace(width=512, height=512)), 64)  # type: ignore[arg-type]
+    mitsuba = Mitsuba("Mitsuba", room(512, 512), 64)
     mitsuba.prepare()
     race([mitsuba], peers.instants(15.0), lambda *_: None)
     assert mitsuba.seconds == pytest.approx(15.0, rel=0.1)
