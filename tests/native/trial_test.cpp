@@ -218,7 +218,6 @@ TEST(ForScene, ChoosesWhatPays) {
     EXPECT_EQ(open.kappa, 0);
     EXPECT_EQ(open.eye_path_length, 16u + 12 + 1) << "paths of as many vertices as connections could make";
     EXPECT_FALSE(open.splats) << "nor do splats pay where nothing focuses light";
-    EXPECT_EQ(open.light_guide.favoured.count, 0u) << "of light paths that there are none of";
     EXPECT_TRUE(for_scene(caustic()->view(), adaptive()).splats);
     const PassSettings room = for_scene(indirect()->view(), adaptive());
     EXPECT_TRUE(room.splats);

@@ -9,7 +9,7 @@ import pytest
 from scenes_for_tests import Builder, assert_same_mean, batches, blocks, grey, looking, settings, transform
 
 from vlp_bpt import Renderer, RenderSettings
-from vlp_bpt.scene import AreaLight, Mesh, Scene, SunLight, World
+from vlp_bpt.scene import AreaLight, Film, Mesh, Scene, SunLight, World
 from vlp_bpt.settings import Mode
 
 
@@ -75,12 +75,20 @@ def among_lamps() -> Scene:
 def test_what_it_found_is_told(make: Callable[[], Scene], portals: bool, lights: bool) -> None:
     scene = make()
     scene.camera = CAMERA
-    renderer = Renderer(scene, RenderSettings(samples=1))
+    renderer = Renderer(scene, RenderSettings(samples=1, adaptive=False))
     told, taken = renderer.metadata(), renderer.statistics
     assert (taken.portals > 0, taken.favoured_lights > 0) == (portals, lights)
     assert (told["portals"], told["favoured_lights"]) == (taken.portals, taken.favoured_lights)
     same = Renderer(scene, RenderSettings(mode=Mode.PAPER, samples=1)).statistics
     assert (same.portals, same.favoured_lights) == (0, 0), "PAPER weighs all strategies the same"
+
+
+def test_where_light_paths_are_left_out_nothing_is_told_of_them() -> None:
+    scene = among_lamps()
+    scene.camera, scene.film = CAMERA, Film(128, 128)
+    renderer = Renderer(scene, RenderSettings(samples=1))
+    renderer.render()
+    assert (renderer.statistics.light_paths, renderer.statistics.favoured_lights) == (0, 0)
 
 
 @pytest.mark.parametrize("make", [under_sky_and_sun, under_sky, among_lamps])
